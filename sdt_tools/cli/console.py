@@ -1,0 +1,19 @@
+"""What commands print: tables and progress for people on stderr, one JSON document for machines on stdout."""
+
+import json
+import sys
+from collections.abc import Mapping
+from typing import Annotated, Any
+
+import typer
+from rich.console import Console
+
+JsonFlag = Annotated[bool, typer.Option("--json", help="Print one JSON document on stdout.")]
+
+console = Console(stderr=True, highlight=False)
+
+
+def emit(document: Mapping[str, Any]) -> None:
+    """Print ``document`` as the one JSON document of this command."""
+    json.dump(document, sys.stdout, indent=2, default=str)
+    sys.stdout.write("\n")

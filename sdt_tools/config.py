@@ -1,0 +1,117 @@
+"""Configuration: TOML files parsed once, at the edge, into frozen typed values.
+
+A key that does not exist is an error that names the nearest one that does. The resolved configuration is saved beside
+every result it shaped.
+"""
+
+import difflib
+import tomllib
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from typing import Any, TypeVar, get_args
+
+import tomli_w
+from pydantic import BaseModel, ConfigDict, ValidationError
+
+from sdt_tools.errors import ConfigError
+from sdt_tools.frames import MotionClass, Twist
+
+
+class Config(BaseModel):
+    """Base of all configuration: frozen, and without room for unknown keys."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True, arbitrary_types_allowed=False)
+
+
+ConfigT = TypeVar("ConfigT", bound=Config)
+
+
+class MotionConfig(Config):
+    """Twist of each motion class.
+
+    ``forward``/``backward`` give the sign of the linear speed; ``left``/``right`` the sign of the turn, left being
+    counter-clockwise whichever way the robot drives.
+    """
+
+    forward_mps: float = 0.5
+    turning_forward_mps: float = 0.35
+    backward_mps: float = 0.4
+    turning_backward_mps: float = 0.25
+    turn_radps: float = 0.9
+
+    def twist(self, motion: MotionClass) -> Twist:
+        """The twist of ``motion``."""
+        turn = {"LEFT": self.turn_radps, "RIGHT": -self.turn_radps}.get(motion.name.split("_")[0], 0.0)
+        if motion is MotionClass.STAY:
+            return Twist(0.0, 0.0)
+        if motion.is_forward:
+            return Twist(self.turning_forward_mps if turn else self.forward_mps, turn)
+        return Twist(-(self.turning_backward_mps if turn else self.backward_mps), turn)
+
+
+class RateConfig(Config):
+    """How often sensors speak and networks decide, in hertz."""
+
+    scan_hz: float = 50.0
+    image_hz: float = 30.0
+    follow_hz: float = 10.0
+    vision_hz: float = 5.0
+
+
+def load_config(model: type[ConfigT], path: Path | None) -> ConfigT:
+    """Read ``path`` as TOML into ``model``; without a path, the defaults.
+
+    Raises ConfigError for a missing file, bad TOML, an unknown key (naming the nearest valid one) or a bad value.
+    """
+    return model() if path is None else parse_config(model, read_toml(path), str(path))
+
+
+def read_toml(path: Path) -> dict[str, Any]:
+    """The tables of a TOML file. Raises ConfigError where it is missing or malformed."""
+    try:
+        return tomllib.loads(path.read_text(encoding="utf-8"))
+    except FileNotFoundError:
+        raise ConfigError(f"{path}: no such file; check the path") from None
+    except IsADirectoryError:
+        raise ConfigError(f"{path}: is a folder; name the TOML file in it") from None
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        raise ConfigError(f"{path}: not valid TOML: {error}") from None
+
+
+def parse_config(model: type[ConfigT], values: Mapping[str, Any], where: str) -> ConfigT:
+    """``values`` as ``model``. Raises ConfigError; ``where`` says in it where the values stood."""
+    try:
+        return model.model_validate(values)
+    except ValidationError as error:
+        raise ConfigError(f"{where}: {_explain(model, error)}") from None
+
+
+def dump_config(config: Config) -> str:
+    """The resolved configuration as TOML; unset optional values are left out."""
+    return tomli_w.dumps(config.model_dump(mode="json", exclude_none=True))
+
+
+def _explain(model: type[Config], error: ValidationError) -> str:
+    first = error.errors()[0]
+    place = ".".join(str(part) for part in first["loc"])
+    if first["type"] == "extra_forbidden":
+        near = difflib.get_close_matches(str(first["loc"][-1]), _keys_at(model, first["loc"][:-1]), n=1, cutoff=0.0)
+        return f"unknown key '{place}'" + (f"; did you mean '{near[0]}'?" if near else "")
+    reason = str(first["msg"])
+    return f"'{place}': {reason[:1].lower()}{reason[1:]}, not {first['input']!r}"
+
+
+def _keys_at(model: type[BaseModel], place: tuple[int | str, ...]) -> list[str]:
+    """Valid keys of the table at ``place``, list positions skipped."""
+    tables = [model]
+    for step in (part for part in place if isinstance(part, str)):
+        inner = [field.annotation for table in tables for name, field in table.model_fields.items() if name == step]
+        tables = [found for annotation in inner for found in _models_in(annotation)] or tables
+    return sorted({name for table in tables for name in table.model_fields})
+
+
+def _models_in(annotation: object) -> Iterator[type[BaseModel]]:
+    if isinstance(annotation, type) and issubclass(annotation, BaseModel):
+        yield annotation
+    for part in get_args(annotation):
+        yield from _models_in(part)

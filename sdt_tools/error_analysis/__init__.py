@@ -1,0 +1,1 @@
+"""Why is this frame wrong: definitions, neighbours, conditions, tags, report."""

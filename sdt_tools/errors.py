@@ -1,0 +1,59 @@
+"""Every failure that a user can cause or meet, as one tree.
+
+SdtError                     exit 1: something failed
+├── UsageError               exit 2: the call or its input is wrong
+│   ├── ConfigError          a configuration or scenario file
+│   ├── RecordingError       a file that is not, or not yet, one of our recordings
+│   ├── LabelError           a label journal
+│   ├── DatasetError         a data set that cannot be built or used
+│   ├── CheckpointError      a model folder
+│   └── OutputExistsError    an output that would be written over
+└── RunError                 a unit of work failed; what was finished before is kept
+
+A message says what happened, where, and what the user can do.
+"""
+
+from pathlib import Path
+
+
+class SdtError(Exception):
+    """A failure with a foreseeable cause. Its text is one line, meant for the user."""
+
+    exit_code = 1
+
+
+class UsageError(SdtError):
+    """The call, or a file given to it, is wrong."""
+
+    exit_code = 2
+
+
+class ConfigError(UsageError):
+    """A configuration, scenario or domain file is wrong."""
+
+
+class RecordingError(UsageError):
+    """A recording is missing, damaged, or lacks what is asked of it."""
+
+
+class LabelError(UsageError):
+    """A label journal is missing or malformed."""
+
+
+class DatasetError(UsageError):
+    """A data set is empty, conflicting, or of another geometry."""
+
+
+class CheckpointError(UsageError):
+    """A model folder is missing, incomplete, or of another architecture."""
+
+
+class OutputExistsError(UsageError):
+    """The output exists; nothing is ever written over unasked."""
+
+    def __init__(self, path: Path) -> None:
+        super().__init__(f"{path} exists already; choose another --out, or move it away")
+
+
+class RunError(SdtError):
+    """A unit of work failed."""

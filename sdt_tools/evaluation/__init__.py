@@ -1,0 +1,1 @@
+"""Closed-loop runs of a model over scenarios, many scenes at once."""

@@ -1,0 +1,1 @@
+"""Label journals: append-only, one row an act."""

@@ -1,0 +1,1 @@
+"""The networks, their preprocessing, and how they are kept on disk."""

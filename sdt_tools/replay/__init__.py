@@ -1,0 +1,1 @@
+"""A model over recordings: one prediction a frame."""

@@ -1,0 +1,1 @@
+"""Safety domains and what can be proved or attacked in them."""

@@ -1,0 +1,1 @@
+"""The simulated world: robot, operator, LiDAR, camera, scenarios."""

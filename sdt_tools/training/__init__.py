@@ -1,0 +1,1 @@
+"""Learning from data sets: schedules and one loop."""

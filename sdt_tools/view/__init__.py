@@ -1,0 +1,1 @@
+"""Rerun: what was recorded, predicted and tagged, on one timeline."""
