@@ -1,1 +1,1 @@
-"""From recordings and labels to frames that a network learns from."""
+"""Recordings and journals, made into data sets."""

@@ -1,0 +1,118 @@
+"""``sdt dataset``: data sets from labelled recordings."""
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from sdt_tools.cli.console import JsonFlag, console, emit
+
+if TYPE_CHECKING:
+    from sdt_tools.dataset.build import ConflictCheck, DatasetSummary
+
+app = typer.Typer(no_args_is_help=True, help="Build data sets from labelled recordings.")
+
+
+@app.callback()
+def dataset() -> None:
+    """Build data sets from labelled recordings."""
+
+
+@app.command("build")
+def build(
+    recordings: Annotated[list[Path], typer.Argument(metavar="REC...", help="Labelled recordings.")],
+    out: Annotated[Path, typer.Option(help="Folder to make, with frames.parquet and manifest.toml.")],
+    config: Annotated[Path | None, typer.Option(help="TOML file; the options below go before it.")] = None,
+    labels: Annotated[Path, typer.Option(help="Folder of the journals, <recording>.motion.csv.")] = Path("labels"),
+    train_frames: Annotated[int | None, typer.Option(help="Training frames in all; without, as many as fit.")] = None,
+    val_frames: Annotated[int | None, typer.Option(help="Validation frames in all; without, as many as fit.")] = None,
+    val_share: Annotated[float | None, typer.Option(help="Share of the recordings kept for validation. [0.2]")] = None,
+    balanced: Annotated[
+        bool | None, typer.Option("--balanced/--as-recorded", help="Equal numbers of each class, or as they come.")
+    ] = None,
+    per_recording_cap: Annotated[int | None, typer.Option(help="At most so many frames of one recording. [40]")] = None,
+    spacing_s: Annotated[float | None, typer.Option(help="Least time between frames of one recording. [0.4]")] = None,
+    tolerance_ms: Annotated[float | None, typer.Option(help="Most time between a label and its scan. [10]")] = None,
+    seed: Annotated[int | None, typer.Option(help="Chooses the recordings that validate, and frames. [0]")] = None,
+    conflict_level: Annotated[
+        int | None, typer.Option(help="Level of the safety domains that labels must not contradict, 0 for none. [3]")
+    ] = None,
+    allow_conflicts: Annotated[
+        bool | None,
+        typer.Option("--allow-conflicts", help="List such labels in the manifest, do not refuse them."),
+    ] = None,
+    json_output: JsonFlag = False,
+) -> None:
+    """Join scans with labels, choose frames by the rules, split them by recording, and write them with a manifest."""
+    from sdt_tools.cli.progress import progress_bar
+    from sdt_tools.config import parse_config, read_toml
+    from sdt_tools.dataset.build import build_dataset
+    from sdt_tools.dataset.config import DatasetConfig
+
+    options = {
+        "train_frames": train_frames,
+        "val_frames": val_frames,
+        "val_share": val_share,
+        "balanced": balanced,
+        "per_recording_cap": per_recording_cap,
+        "spacing_s": spacing_s,
+        "tolerance_ms": tolerance_ms,
+        "seed": seed,
+        "conflict_level": conflict_level,
+        "allow_conflicts": allow_conflicts,
+    }
+    given = {name: value for name, value in options.items() if value is not None}
+    file_values = {} if config is None else read_toml(config)
+    settings = parse_config(DatasetConfig, file_values, str(config))
+    settings = parse_config(DatasetConfig, file_values | given, "the options")
+    with progress_bar("reading recordings") as report:
+        summary = build_dataset(recordings, labels, settings, out, _conflict_check(settings.conflict_level), report)
+    if json_output:
+        emit(_document(summary))
+    else:
+        _show(summary)
+
+
+def _conflict_check(level: int) -> "ConflictCheck":
+    """Safety domains speak of scans whose codes are resolved, so that is done first."""
+    from sdt_tools.models.preprocess import PreprocessConfig, resolve_codes
+    from sdt_tools.robustness.domains import SafetyLevel, conflicts
+
+    return lambda ranges_m, labels: conflicts(resolve_codes(ranges_m, PreprocessConfig()), labels, SafetyLevel(level))
+
+
+def _document(summary: "DatasetSummary") -> dict[str, object]:
+    return {
+        "out": str(summary.folder),
+        "hash": summary.hash,
+        "recordings": summary.recordings,
+        "train_frames": summary.train_frames,
+        "val_frames": summary.val_frames,
+        "counts": summary.counts,
+        "conflicts": summary.conflicts,
+        "unmatched_labels": summary.unmatched_labels,
+        "disputed_stamps": summary.disputed_stamps,
+        "broken_lines": summary.broken_lines,
+        "damaged": list(summary.damaged),
+    }
+
+
+def _show(summary: "DatasetSummary") -> None:
+    from rich.table import Table
+
+    table = Table("class", *summary.counts)
+    for name in summary.counts["train"]:
+        table.add_row(name, *(f"{by_class[name]:,}" for by_class in summary.counts.values()))
+    table.add_row("all", f"{summary.train_frames:,}", f"{summary.val_frames:,}")
+    console.print(table)
+    notes = {
+        "frames in a safety domain with a label that it forbids, listed in the manifest": summary.conflicts,
+        "labels without a scan near enough": summary.unmatched_labels,
+        "stamps left out because humans disagree": summary.disputed_stamps,
+        "broken lines in journals, which count for nothing": summary.broken_lines,
+        "recordings cut or damaged, and read as far as that goes": len(summary.damaged),
+    }
+    for what, count in notes.items():
+        if count:
+            console.print(f"{what}: {count:,}", soft_wrap=True)
+    console.print(f"{summary.folder} from {summary.recordings} recordings, hash {summary.hash[:16]}", soft_wrap=True)

@@ -1,0 +1,189 @@
+"""Recordings and their journals, made into a data set.
+
+Labels decide first which frames are taken; then the scans of those are read, recording by recording, so that memory
+holds stamps and one row group of frames, never a whole recording.
+"""
+
+import os
+import shutil
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from itertools import pairwise
+from pathlib import Path
+from typing import Final
+
+import numpy as np
+from jaxtyping import Bool, Float64, Int64
+
+from sdt_tools.dataset.candidates import SCANS_A_BATCH, LabelledRecording, read_labelled
+from sdt_tools.dataset.config import DatasetConfig
+from sdt_tools.dataset.frames_file import FRAMES_FILE, FrameBlock, FramesWriter
+from sdt_tools.dataset.manifest import MANIFEST_FILE, Conflict, Used, manifest_toml
+from sdt_tools.dataset.select import TRAIN, VAL, Selection, select_frames
+from sdt_tools.errors import DatasetError, OutputExistsError
+from sdt_tools.labeling.vocabulary import LabelKind
+from sdt_tools.recording.reader import Recording
+from sdt_tools.runs.local import Progress
+
+CONFLICTS_SHOWN: Final = 3
+
+ConflictCheck = Callable[[Float64[np.ndarray, "frames rays"], Int64[np.ndarray, "frames"]], Bool[np.ndarray, "frames"]]
+"""Given ranges as the sensor gave them and labels, which frames carry a label that a safety domain forbids."""
+
+
+@dataclass(frozen=True)
+class DatasetSummary:
+    """What was built. ``counts`` is by split and class name."""
+
+    folder: Path
+    hash: str
+    recordings: int
+    train_frames: int
+    val_frames: int
+    counts: dict[str, dict[str, int]]
+    conflicts: int | None
+    """Frames in a safety domain with a forbidden label; None where they were not looked for."""
+    unmatched_labels: int
+    """Labels without a scan near enough."""
+    disputed_stamps: int
+    """Stamps left out because humans disagree about them."""
+    broken_lines: int
+    """Journal lines that crashes broke off."""
+    damaged: tuple[str, ...]
+    """Recordings that were cut or damaged, and read as far as that goes."""
+
+
+def build_dataset(
+    recordings: Sequence[Path],
+    labels_dir: Path,
+    config: DatasetConfig,
+    out: Path,
+    conflict_check: ConflictCheck | None = None,
+    progress: Progress | None = None,
+) -> DatasetSummary:
+    """Build the folder ``out`` with frames.parquet and manifest.toml; the same inputs give the same content.
+
+    ``progress`` counts recordings read, each once for its labels and once for its scans.
+
+    Raises OutputExistsError; RecordingError or LabelError for an input that cannot be read; DatasetError where no
+    recording is given, one is given twice, a class cannot fill its quota (naming class, have and need), or, unless the
+    config allows it, labels contradict safety domains.
+    """
+    if out.exists():
+        raise OutputExistsError(out)
+    report = progress or _no_progress
+    total = 2 * len(recordings)
+    labelled: list[LabelledRecording] = []
+    for path in recordings:
+        report(len(labelled), total)
+        labelled.append(read_labelled(path, labels_dir, config))
+    labelled.sort(key=lambda recording: recording.recording_id)
+    _refuse_repeated(labelled)
+    selections = select_frames(labelled, config)
+    classes = LabelKind(config.kind).classes
+    with _folder_when_whole(out) as scratch:
+        conflicts: list[Conflict] = []
+        with FramesWriter(scratch / FRAMES_FILE, classes) as writer:
+            for place, selection in enumerate(selections):
+                report(len(labelled) + place, total)
+                for block in _blocks(selection):
+                    writer.write(block)
+                    if conflict_check is not None:
+                        conflicts += _conflicts(block, conflict_check, classes)
+            frames_hash = writer.close()
+        if conflicts and not config.allow_conflicts:
+            raise DatasetError(_refusal(conflicts, config))
+        counts = _counts(selections, classes)
+        used = [Used(entry.recording, entry.split, len(entry.frames)) for entry in selections]
+        found = None if conflict_check is None else conflicts
+        manifest = manifest_toml(config, classes, counts, used, found, frames_hash)
+        (scratch / MANIFEST_FILE).write_text(manifest, encoding="utf-8")
+    report(total, total)
+    return DatasetSummary(
+        folder=out,
+        hash=frames_hash,
+        recordings=len(labelled),
+        train_frames=sum(counts[TRAIN].values()),
+        val_frames=sum(counts[VAL].values()),
+        counts=counts,
+        conflicts=None if found is None else len(found),
+        unmatched_labels=sum(recording.unmatched for recording in labelled),
+        disputed_stamps=sum(recording.disputed for recording in labelled),
+        broken_lines=sum(recording.broken_lines for recording in labelled),
+        damaged=tuple(entry.path.stem for entry in labelled if entry.truncated or entry.damaged),
+    )
+
+
+def _no_progress(_done: int, _total: int) -> None:
+    """Nobody is watching."""
+
+
+def _refuse_repeated(labelled: Sequence[LabelledRecording]) -> None:
+    if not labelled:
+        raise DatasetError("no recordings given; name at least two, one to train and one to validate")
+    for one, other in pairwise(labelled):
+        if one.recording_id == other.recording_id:
+            raise DatasetError(f"{one.path} and {other.path} are the same recording ({one.recording_id}); give it once")
+
+
+def _blocks(selection: Selection) -> Iterator[FrameBlock]:
+    """The chosen frames of a recording with their ranges, in order of time within each block of its scans."""
+    recording = selection.recording
+    chosen = recording.positions[selection.frames]
+    pool = recording.pool
+    start = 0
+    if not len(chosen):
+        return
+    with Recording.open(recording.path) as opened:
+        for batch in opened.scan_batches(SCANS_A_BATCH):
+            here = np.flatnonzero((chosen >= start) & (chosen < start + len(batch)))
+            frames, rows = selection.frames[here], chosen[here] - start
+            start += len(batch)
+            if len(here):
+                yield FrameBlock(
+                    split=selection.split,
+                    recording_id=recording.recording_id,
+                    recording=recording.path.stem,
+                    stamps_ns=pool.stamps_ns[frames],
+                    labels=pool.labels[frames],
+                    ranges_m=batch.ranges_m[rows],
+                )
+
+
+def _conflicts(block: FrameBlock, check: ConflictCheck, classes: Sequence[str]) -> list[Conflict]:
+    forbidden = np.flatnonzero(check(block.ranges_m, block.labels)).tolist()
+    return [
+        Conflict(block.recording, int(block.stamps_ns[place]), classes[int(block.labels[place])]) for place in forbidden
+    ]
+
+
+def _refusal(conflicts: Sequence[Conflict], config: DatasetConfig) -> str:
+    shown = ", ".join(f"{one.recording} at {one.stamp_ns} ns ({one.label})" for one in conflicts[:CONFLICTS_SHOWN])
+    more = f" and {len(conflicts) - CONFLICTS_SHOWN} more" if len(conflicts) > CONFLICTS_SHOWN else ""
+    return (
+        f"frames in a safety domain of level {config.conflict_level} that forbids their label: {len(conflicts)} "
+        f"({shown}{more}); label them anew, or allow conflicts, and the manifest lists them all"
+    )
+
+
+def _counts(selections: Sequence[Selection], classes: Sequence[str]) -> dict[str, dict[str, int]]:
+    counts = {split: dict.fromkeys(classes, 0) for split in (TRAIN, VAL)}
+    for selection in selections:
+        for label in selection.recording.pool.labels[selection.frames].tolist():
+            counts[selection.split][classes[label]] += 1
+    return counts
+
+
+@contextmanager
+def _folder_when_whole(out: Path) -> Iterator[Path]:
+    """A scratch folder that takes the name ``out`` when the block ends well, and vanishes when it does not."""
+    scratch = out.with_name(f".{out.name}.{os.getpid()}.part")
+    shutil.rmtree(scratch, ignore_errors=True)
+    scratch.mkdir(parents=True)
+    try:
+        yield scratch
+        scratch.rename(out)
+    except BaseException:
+        shutil.rmtree(scratch, ignore_errors=True)
+        raise

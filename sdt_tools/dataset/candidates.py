@@ -1,0 +1,91 @@
+"""The labelled frames of a recording, known by stamp and label alone; scans are read once the frames are chosen."""
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import polars as pl
+from jaxtyping import Int64
+
+from sdt_tools.dataset.choice import Pool
+from sdt_tools.dataset.config import DatasetConfig
+from sdt_tools.dataset.join import nearest_pairs
+from sdt_tools.labeling.journal import read_journal
+from sdt_tools.labeling.resolve import disagreements, resolve
+from sdt_tools.labeling.vocabulary import LabelKind, journal_path
+from sdt_tools.recording.reader import Recording
+from sdt_tools.runs.unit import content_hash
+
+SCANS_A_BATCH = 2048
+MS_NS = 1_000_000
+
+
+@dataclass(frozen=True, eq=False)
+class LabelledRecording:
+    """A recording, its journal, and its frames that have a label.
+
+    ``pool`` holds the frames in order of time, ``positions`` where each stands among the recording's scans.
+    """
+
+    path: Path
+    recording_id: str
+    scenario: str
+    sha256: str
+    journal: Path
+    journal_sha256: str
+    pool: Pool
+    positions: Int64[np.ndarray, "frames"]
+    scans: int
+    labels: int
+    disputed: int
+    """Stamps without a label because humans disagree."""
+    broken_lines: int
+    """Journal lines that a crash broke off."""
+    truncated: bool
+    """Whether the recording was cut, and read as far as it goes."""
+    damaged: int
+    """Chunks of the recording that could not be read."""
+
+    @property
+    def unmatched(self) -> int:
+        """Labels without a scan near enough."""
+        return self.labels - len(self.pool.stamps_ns)
+
+
+def read_labelled(path: Path, labels_dir: Path, config: DatasetConfig) -> LabelledRecording:
+    """Join the scans of the recording at ``path`` with its resolved labels; ranges do not stay in memory.
+
+    Raises RecordingError or LabelError where either cannot be read.
+    """
+    kind = LabelKind(config.kind)
+    journal = journal_path(labels_dir, path.stem, kind)
+    with Recording.open(path) as recording:
+        recording_id = recording.recording_id
+        scenario = recording.session.get("scenario", "")
+        acts = read_journal(journal, recording_id)
+        batches = [batch.stamps_ns.copy() for batch in recording.scan_batches(SCANS_A_BATCH)]
+        truncated, damaged = recording.truncated, len(recording.damage)
+    labels = resolve(acts)
+    scan_stamps_ns = np.concatenate(batches) if batches else np.empty(0, dtype=np.int64)
+    by_time = np.argsort(scan_stamps_ns, kind="stable")
+    pairs = nearest_pairs(labels["stamp_ns"].to_numpy(), scan_stamps_ns[by_time], round(config.tolerance_ms * MS_NS))
+    in_time = pairs[np.argsort(pairs[:, 1])]
+    index = {name: place for place, name in enumerate(kind.classes)}
+    codes = labels["label"].replace_strict(index, return_dtype=pl.Int64).to_numpy()
+    positions = by_time[in_time[:, 1]]
+    return LabelledRecording(
+        path=path,
+        recording_id=recording_id,
+        scenario=scenario,
+        sha256=content_hash(path),
+        journal=journal,
+        journal_sha256=content_hash(journal),
+        pool=Pool(scan_stamps_ns[positions], codes[in_time[:, 0]]),
+        positions=positions,
+        scans=len(scan_stamps_ns),
+        labels=len(labels),
+        disputed=disagreements(acts)["stamp_ns"].n_unique(),
+        broken_lines=len(acts.broken_lines),
+        truncated=truncated,
+        damaged=damaged,
+    )
