@@ -11,7 +11,7 @@ import os
 import shutil
 import time
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass, fields, is_dataclass
+from dataclasses import dataclass, field, fields, is_dataclass
 from enum import Enum
 from functools import cache
 from pathlib import Path
@@ -30,12 +30,14 @@ class Unit:
     """``function(folder, **arguments)`` fills the folder ``name``.
 
     Arguments are values that can be hashed: numbers, strings, configurations, frozen dataclasses, sequences and
-    mappings of them. A ``Path`` stands for the content of the file or folder it names.
+    mappings of them. A ``Path`` stands for the content of the file or folder it names; a finished unit's folder for its
+    record. ``context`` is passed on likewise but does not shape the result, and is not hashed.
     """
 
     name: str
     function: Callable[..., None]
     arguments: Mapping[str, object]
+    context: Mapping[str, object] = field(default_factory=dict)
 
     def fingerprint(self) -> str:
         """SHA-256 over the function's name, the package's code and all arguments."""
@@ -50,11 +52,7 @@ class Unit:
 
 def finished(unit: Unit, root: Path) -> bool:
     """Whether ``root/unit.name`` was made by this unit from these inputs."""
-    try:
-        record = json.loads((root / unit.name / RECORD).read_text(encoding="utf-8"))
-    except (OSError, ValueError):
-        return False
-    return bool(record.get("fingerprint") == unit.fingerprint())
+    return _recorded_fingerprint(root / unit.name) == unit.fingerprint()
 
 
 def execute(unit: Unit, root: Path) -> Path:
@@ -72,7 +70,7 @@ def execute(unit: Unit, root: Path) -> Path:
     scratch.mkdir(parents=True)
     started = time.monotonic()
     try:
-        unit.function(scratch, **unit.arguments)
+        unit.function(scratch, **unit.arguments, **unit.context)
     except SdtError:
         shutil.rmtree(scratch, ignore_errors=True)
         raise
@@ -110,7 +108,16 @@ def content_hash(path: Path) -> str:
     return digest.hexdigest()
 
 
+def _recorded_fingerprint(folder: Path) -> str | None:
+    try:
+        return str(json.loads((folder / RECORD).read_text(encoding="utf-8"))["fingerprint"])
+    except (OSError, ValueError, KeyError):
+        return None
+
+
 def _canonical(value: object) -> str:
+    if isinstance(value, Path) and (value / RECORD).is_file():
+        return f"unit:{_recorded_fingerprint(value)}"
     if isinstance(value, Path):
         return f"content:{content_hash(value) if value.exists() else 'missing'}"
     if isinstance(value, BaseModel):

@@ -1,0 +1,1 @@
+"""The whole pipeline on the scene, small: from recordings to a report of why frames are wrong."""

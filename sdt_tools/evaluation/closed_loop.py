@@ -1,0 +1,196 @@
+"""Many scenes stepped together: rays cast for all of them at once, one batch for the network at each decision."""
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Final, Protocol, runtime_checkable
+
+import numpy as np
+from jaxtyping import Float64
+
+from sdt_tools.clock import FAST_EPOCH_NS, SECOND_NS
+from sdt_tools.config import Config
+from sdt_tools.evaluation.outcome import Judge, Situation, SuccessConfig, Verdict
+from sdt_tools.evaluation.policies import Policy
+from sdt_tools.evaluation.results import RunResult, TracePoint
+from sdt_tools.frames import RAYS, LidarScan, MotionClass, MotionCommand, Pose2D, Twist
+from sdt_tools.scene.config import PHYSICS_HZ, SceneConfig
+from sdt_tools.scene.expert import SceneExpert
+from sdt_tools.scene.layout import Layout
+from sdt_tools.scene.raycast import cast_rays_many, pack_scenes
+from sdt_tools.scene.seeds import Stream, generator
+from sdt_tools.scene.sensor import SensorModel
+from sdt_tools.scene.world import World
+
+FRONT_RAYS: Final = slice(230, 311)
+"""The rays within ±20° of straight ahead, of which a trace notes the nearest true range."""
+
+
+class ClosedLoopConfig(Config):
+    """Scene and limits of an evaluation."""
+
+    scene: SceneConfig = SceneConfig()
+    success: SuccessConfig = SuccessConfig()
+
+
+@runtime_checkable
+class RunRecorder(Protocol):
+    """Keeps what one run's sensors said and what was decided."""
+
+    def scan(self, world: World, scan: LidarScan) -> None:
+        """A scan was taken."""
+        ...
+
+    def command(self, command: MotionCommand) -> None:
+        """A motion was decided on."""
+        ...
+
+    def close(self, verdict: Verdict) -> str | None:
+        """The run is over; the name of the recording, where one is kept."""
+        ...
+
+
+STANDING: Final = Twist(0.0, 0.0)
+
+RecorderFactory = Callable[[Layout], RunRecorder]
+
+
+@dataclass(eq=False)
+class _Run:
+    layout: Layout
+    world: World
+    expert: SceneExpert
+    sensor: SensorModel
+    judge: Judge
+    recorder: RunRecorder | None
+    trace: list[TracePoint]
+    twist: Twist = STANDING
+    verdict: Verdict | None = None
+
+
+def drive_closed_loop(
+    layouts: Sequence[Layout],
+    policy: Policy,
+    config: ClosedLoopConfig,
+    recorder_for: RecorderFactory | None = None,
+) -> list[RunResult]:
+    """Let ``policy`` drive each layout to its verdict; results come in the order of the layouts.
+
+    Scans are taken at ``rates.scan_hz``, decisions fall at ``rates.follow_hz`` on the newest of them. A run's
+    randomness is its seed's alone, so it does not depend on the runs beside it.
+    """
+    scan_every = max(1, round(PHYSICS_HZ / config.scene.rates.scan_hz))
+    decide_every = max(scan_every, round(PHYSICS_HZ / config.scene.rates.follow_hz))
+    runs = [_start(layout, config, recorder_for) for layout in layouts]
+    live, tick = runs, 0
+    while live:
+        if tick % scan_every == 0:
+            true_ranges_m = _cast(live)
+            scans = [_measure(run, ranges) for run, ranges in zip(live, true_ranges_m, strict=True)]
+            if tick % decide_every == 0:
+                _decide(live, scans, true_ranges_m, policy, config)
+                live = [run for run in live if run.verdict is None]
+        for run in live:
+            run.world.step(run.twist)
+        tick += 1
+    return [_finish(run, policy) for run in runs]
+
+
+def _start(layout: Layout, config: ClosedLoopConfig, recorder_for: RecorderFactory | None) -> _Run:
+    world = World(layout, config.scene)
+    return _Run(
+        layout=layout,
+        world=world,
+        expert=SceneExpert(world),
+        sensor=SensorModel(config.scene.sensor, generator(layout.seed, Stream.SENSOR)),
+        judge=Judge(layout.timeout_s, config.success),
+        recorder=recorder_for(layout) if recorder_for else None,
+        trace=[],
+    )
+
+
+def _cast(runs: Sequence[_Run]) -> Float64[np.ndarray, "runs rays"]:
+    scenes = pack_scenes([run.world.segments for run in runs], [run.world.circles for run in runs])
+    poses = np.array([(p.x_m, p.y_m, p.yaw_rad) for p in (run.world.lidar_pose for run in runs)])
+    out = np.empty((len(runs), RAYS))
+    cast_rays_many(poses, scenes.segments, scenes.segment_ends, scenes.circles, scenes.circle_ends, out)
+    return out
+
+
+def _measure(run: _Run, true_ranges_m: Float64[np.ndarray, "rays"]) -> LidarScan:
+    scan = LidarScan(_stamp_ns(run.world), run.sensor.measure(true_ranges_m))
+    if run.recorder:
+        run.recorder.scan(run.world, scan)
+    return scan
+
+
+def _decide(
+    runs: Sequence[_Run],
+    scans: Sequence[LidarScan],
+    true_ranges_m: Float64[np.ndarray, "runs rays"],
+    policy: Policy,
+    config: ClosedLoopConfig,
+) -> None:
+    motions = policy.decide(np.stack([scan.ranges_m for scan in scans]), [run.expert for run in runs])
+    for run, scan, true_m, motion in zip(runs, scans, true_ranges_m, motions, strict=True):
+        situation = _situation(run)
+        run.trace.append(_trace_point(run.world, situation, float(true_m[FRONT_RAYS].min()), motion))
+        run.twist = config.scene.motions.twist(motion)
+        if run.recorder:
+            run.recorder.command(
+                MotionCommand(scan.stamp_ns, motion, run.twist, driver=policy.name, expert=run.expert.advise())
+            )
+        run.verdict = run.judge.see(situation)
+
+
+def _situation(run: _Run) -> Situation:
+    world, lidar, operator = run.world, run.world.lidar_pose, run.world.operator
+    dx_m, dy_m = operator.x_m - lidar.x_m, operator.y_m - lidar.y_m
+    before = run.trace[-1] if run.trace else None
+    return Situation(
+        time_s=world.time_s,
+        robot=world.robot,
+        operator_range_m=math.hypot(dx_m, dy_m),
+        operator_bearing_rad=math.remainder(math.atan2(dy_m, dx_m) - lidar.yaw_rad, math.tau),
+        operator_visible=world.operator_visible(),
+        operator_standing=before is not None and _same_place(before, operator),
+        operator_ended=world.operator_done,
+        contact=world.contact,
+    )
+
+
+def _same_place(before: TracePoint, operator: Pose2D) -> bool:
+    return math.hypot(operator.x_m - before.operator_x_m, operator.y_m - before.operator_y_m) < 1e-3
+
+
+def _trace_point(world: World, now: Situation, front_range_m: float, motion: MotionClass) -> TracePoint:
+    return TracePoint(
+        time_s=now.time_s,
+        robot_x_m=now.robot.x_m,
+        robot_y_m=now.robot.y_m,
+        robot_yaw_rad=now.robot.yaw_rad,
+        operator_x_m=world.operator.x_m,
+        operator_y_m=world.operator.y_m,
+        operator_range_m=now.operator_range_m,
+        operator_bearing_rad=now.operator_bearing_rad,
+        front_range_m=front_range_m,
+        motion=motion.label,
+    )
+
+
+def _finish(run: _Run, policy: Policy) -> RunResult:
+    assert run.verdict is not None
+    return RunResult(
+        policy=policy.name,
+        scenario=run.layout.name,
+        seed=run.layout.seed,
+        outcome=run.verdict.outcome,
+        reason=run.verdict.reason,
+        simulated_s=run.world.time_s,
+        trace=tuple(run.trace),
+        recording=run.recorder.close(run.verdict) if run.recorder else None,
+    )
+
+
+def _stamp_ns(world: World) -> int:
+    return FAST_EPOCH_NS + round(world.time_s * SECOND_NS)

@@ -1,0 +1,152 @@
+"""Policies × scenarios × seeds: units of closed-loop runs, and their tally."""
+
+import hashlib
+import json
+import time
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Final
+
+import polars as pl
+
+from sdt_tools.config import dump_config
+from sdt_tools.errors import UsageError
+from sdt_tools.evaluation.closed_loop import ClosedLoopConfig, drive_closed_loop
+from sdt_tools.evaluation.policies import policy_for
+from sdt_tools.evaluation.results import RUNS_FILE, TRACES_FILE, Tally, tally, write_results
+from sdt_tools.evaluation.saving import SaveRuns, recorder_factory
+from sdt_tools.runs.local import Progress, run_units
+from sdt_tools.runs.unit import Unit, content_hash
+from sdt_tools.scene.scenario import layout_for
+
+SEEDS_A_UNIT: Final = 10
+"""Runs stepped together. The same whatever the number of workers, so that results do not depend on it."""
+
+_TIMING_FILE = "timing.json"
+_RECORDINGS = "recordings"
+
+
+@dataclass(frozen=True)
+class EvaluationSummary:
+    """Tallies by model (as it was named in the call) and scenario, and where runs, traces and recordings lie.
+
+    ``real_time_factor`` is simulated robot-seconds per second of stepping, all workers together; starting processes is
+    left out of it.
+    """
+
+    models: Mapping[str, Mapping[str, Tally]]
+    real_time_factor: float
+    runs: Path
+    traces: Path
+    recordings: tuple[Path, ...]
+
+
+def evaluate_follow(
+    models: Sequence[str],
+    scenarios: Sequence[str],
+    seeds: Sequence[int],
+    config: ClosedLoopConfig,
+    out: Path,
+    save: SaveRuns = SaveRuns.NONE,
+    workers: int = 1,
+    progress: Progress | None = None,
+) -> EvaluationSummary:
+    """Drive every model through every scenario with every seed, in blocks that are skipped where ``out`` has them.
+
+    ``models`` are checkpoint folders, ``expert`` or ``constant:<class>``; ``scenarios`` names or files. Raises
+    UsageError for empty or repeated arguments, and whatever loading a model or a scenario raises, before any run.
+    """
+    _check(models, scenarios, seeds)
+    units: dict[str, list[Unit]] = {}
+    for model in models:
+        name = _unit_name(model)
+        for scenario in scenarios:
+            layout_for(scenario, seeds[0])
+            units.setdefault(model, []).extend(_units(name, model, scenario, seeds, config, save))
+    folders = iter(run_units([unit for group in units.values() for unit in group], out, workers, progress))
+    by_model = {model: [next(folders) for _ in group] for model, group in units.items()}
+    every = [folder for group in by_model.values() for folder in group]
+    return EvaluationSummary(
+        models={model: _tally(group) for model, group in by_model.items()},
+        real_time_factor=_real_time_factor(every, workers),
+        runs=_gather(every, RUNS_FILE, out),
+        traces=_gather(every, TRACES_FILE, out),
+        recordings=tuple(sorted(path for folder in every for path in (folder / _RECORDINGS).glob("*.mcap"))),
+    )
+
+
+def parse_seeds(text: str) -> list[int]:
+    """Seeds from ``7``, ``1000-1019`` or a list of such with commas. Raises UsageError."""
+    seeds: list[int] = []
+    for part in text.split(","):
+        first, dash, last = part.strip().partition("-")
+        if not first.isdecimal() or (dash and not last.isdecimal()) or (dash and int(last) < int(first)):
+            raise UsageError(f"--seeds {text}: give seeds as 7, 1000-1019 or 3,5,1000-1009")
+        seeds += range(int(first), int(last or first) + 1)
+    return seeds
+
+
+def run_block(
+    out: Path, model: str, scenario: str, seeds: Sequence[int], config: ClosedLoopConfig, save: SaveRuns
+) -> None:
+    """One unit: a block of seeds of one model in one scenario."""
+    policy = policy_for(model)
+    layouts = [layout_for(scenario, seed) for seed in seeds]
+    recorder_for = recorder_factory(out / _RECORDINGS, policy.name, save, dump_config(config))
+    started_s = time.perf_counter()
+    results = drive_closed_loop(layouts, policy, config, recorder_for)
+    timing = {
+        "busy_s": time.perf_counter() - started_s,
+        "simulated_s": sum(result.simulated_s for result in results),
+    }
+    write_results(out, results)
+    (out / _TIMING_FILE).write_text(json.dumps(timing) + "\n", encoding="utf-8")
+
+
+def _check(models: Sequence[str], scenarios: Sequence[str], seeds: Sequence[int]) -> None:
+    for what, given in (("model", models), ("scenario", scenarios), ("seed", seeds)):
+        if not given:
+            raise UsageError(f"no {what} given; name at least one")
+        if len(set(given)) < len(given):
+            raise UsageError(f"a {what} is given twice; name each once")
+
+
+def _unit_name(model: str) -> str:
+    policy = policy_for(model)
+    path = Path(model)
+    identity = content_hash(path) if path.is_dir() else hashlib.sha256(model.encode()).hexdigest()
+    return f"{policy.name.replace(':', '-')}-{identity[:8]}"
+
+
+def _units(
+    name: str, model: str, scenario: str, seeds: Sequence[int], config: ClosedLoopConfig, save: SaveRuns
+) -> list[Unit]:
+    blocks = [seeds[start : start + SEEDS_A_UNIT] for start in range(0, len(seeds), SEEDS_A_UNIT)]
+    where = Path(scenario).stem
+    return [
+        Unit(
+            f"{name}/{where}/{block[0]}-{block[-1]}",
+            run_block,
+            {"model": model, "scenario": scenario, "seeds": tuple(block), "config": config, "save": save},
+        )
+        for block in blocks
+    ]
+
+
+def _tally(folders: Sequence[Path]) -> dict[str, Tally]:
+    runs = pl.concat([pl.read_parquet(folder / RUNS_FILE) for folder in folders])
+    (by_scenario,) = tally(runs).values()
+    return by_scenario
+
+
+def _gather(folders: Sequence[Path], file: str, out: Path) -> Path:
+    table = pl.concat([pl.read_parquet(folder / file) for folder in folders])
+    table.write_parquet(out / file)
+    return out / file
+
+
+def _real_time_factor(folders: Sequence[Path], workers: int) -> float:
+    timings = [json.loads((folder / _TIMING_FILE).read_text(encoding="utf-8")) for folder in folders]
+    busy_s = sum(timing["busy_s"] for timing in timings)
+    return float(sum(timing["simulated_s"] for timing in timings) / busy_s * min(workers, len(folders)))

@@ -1,0 +1,75 @@
+"""Driven paths on their layouts: one small map a run."""
+
+import math
+from pathlib import Path
+from typing import Final
+
+import polars as pl
+from matplotlib.axes import Axes
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from matplotlib.patches import Circle, Polygon
+
+from sdt_tools.evaluation.outcome import Outcome
+from sdt_tools.scene.layout import Layout
+from sdt_tools.scene.scenario import layout_for
+
+OUTCOME_COLOURS: Final = {
+    Outcome.OK.value: "#2a9d8f",
+    Outcome.CONTACT.value: "#d62828",
+    Outcome.LOST.value: "#f77f00",
+    Outcome.STUCK.value: "#7b2cbf",
+    Outcome.TIMEOUT.value: "#6c757d",
+}
+_COLUMNS: Final = 5
+_PANEL_IN: Final = 2.6
+
+
+def runs_figure(runs: pl.DataFrame, traces: pl.DataFrame, scenario: str, title: str, out: Path) -> None:
+    """Draw the runs of one policy in one scenario (rows of the tables of an evaluation) to the PNG ``out``.
+
+    ``scenario`` is the name or file that the runs were made with.
+    """
+    rows = max(1, math.ceil(len(runs) / _COLUMNS))
+    figure = Figure(figsize=(_COLUMNS * _PANEL_IN, rows * _PANEL_IN * 0.8 + 0.8), layout="constrained")
+    FigureCanvasAgg(figure)
+    panels = figure.subplots(rows, _COLUMNS, squeeze=False).flatten()
+    for panel in panels:
+        panel.set_axis_off()
+    for panel, run in zip(panels, runs.sort("seed").iter_rows(named=True), strict=False):
+        draw_layout(panel, layout_for(scenario, run["seed"]))
+        _draw_run(panel, traces.filter(pl.col("seed") == run["seed"]), run["outcome"])
+        panel.set_title(f"{run['seed']}: {run['outcome']}, {run['simulated_s']:.0f} s", fontsize=8)
+    figure.suptitle(title, fontsize=11)
+    figure.legend(handles=_legend(set(runs["outcome"])), loc="outside lower center", ncols=6, fontsize=8, frameon=False)
+    figure.savefig(out, dpi=90)
+
+
+def draw_layout(panel: Axes, layout: Layout) -> None:
+    """Walls, boxes and posts from above: x to the right, y up, metres."""
+    for wall in layout.walls:
+        panel.plot([wall.x0_m, wall.x1_m], [wall.y0_m, wall.y1_m], color="#343a40", linewidth=1.2)
+    for box in layout.boxes:
+        panel.add_patch(Polygon(box.corners(), facecolor="#ced4da", edgecolor="#343a40", linewidth=0.8))
+    for post in layout.posts:
+        panel.add_patch(Circle((post.x_m, post.y_m), post.radius_m, color="#343a40"))
+    panel.set_aspect("equal")
+
+
+def _draw_run(panel: Axes, trace: pl.DataFrame, outcome: str) -> None:
+    panel.plot(trace["operator_x_m"], trace["operator_y_m"], color="#adb5bd", linewidth=1.0, linestyle="--")
+    panel.plot(trace["robot_x_m"], trace["robot_y_m"], color=OUTCOME_COLOURS[outcome], linewidth=1.6)
+    panel.plot(trace["robot_x_m"][:1], trace["robot_y_m"][:1], "o", color=OUTCOME_COLOURS[outcome], markersize=4)
+    panel.plot(trace["operator_x_m"][-1:], trace["operator_y_m"][-1:], "x", color="#495057", markersize=5)
+
+
+def _legend(outcomes: set[str]) -> list[Line2D]:
+    robot = [
+        Line2D([], [], color=colour, label=f"robot's centre, {name}")
+        for name, colour in OUTCOME_COLOURS.items()
+        if name in outcomes
+    ]
+    operator = Line2D([], [], color="#adb5bd", linestyle="--", label="operator")
+    end = Line2D([], [], color="#495057", marker="x", linestyle="", label="his end")
+    return [*robot, operator, end]

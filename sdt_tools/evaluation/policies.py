@@ -1,0 +1,81 @@
+"""Who drives in an evaluation: a network, the expert, or a constant class as a baseline that must fail."""
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Protocol, runtime_checkable
+
+import numpy as np
+from jaxtyping import Float64
+
+from sdt_tools.errors import UsageError
+from sdt_tools.frames import MotionClass
+from sdt_tools.models.checkpoint import load_checkpoint
+from sdt_tools.models.loaded import LoadedModel
+from sdt_tools.protocols import Expert
+
+
+@runtime_checkable
+class Policy(Protocol):
+    """Decides for many runs at once."""
+
+    @property
+    def name(self) -> str:
+        """How results and recordings call the policy."""
+        ...
+
+    def decide(self, ranges_m: Float64[np.ndarray, "runs rays"], experts: Sequence[Expert]) -> list[MotionClass]:
+        """One motion a run, from its newest scan; the scene's truth is there for the expert alone."""
+        ...
+
+
+class NetworkPolicy:
+    """A trained follow network: the class of the largest logit."""
+
+    def __init__(self, model: LoadedModel) -> None:
+        self._model = model
+        self.name = f"policy:{model.name}"
+
+    def decide(self, ranges_m: Float64[np.ndarray, "runs rays"], experts: Sequence[Expert]) -> list[MotionClass]:
+        """One motion a run."""
+        assert len(experts) == len(ranges_m)
+        return [MotionClass(int(best)) for best in self._model.predict_logits(ranges_m).argmax(axis=1)]
+
+
+class ExpertPolicy:
+    """The expert with the scene's truth."""
+
+    name = "expert"
+
+    def decide(self, ranges_m: Float64[np.ndarray, "runs rays"], experts: Sequence[Expert]) -> list[MotionClass]:
+        """One motion a run."""
+        assert len(experts) == len(ranges_m)
+        return [expert.advise() for expert in experts]
+
+
+class ConstantPolicy:
+    """Always the same class."""
+
+    def __init__(self, motion: MotionClass) -> None:
+        self._motion = motion
+        self.name = f"constant:{motion.label}"
+
+    def decide(self, ranges_m: Float64[np.ndarray, "runs rays"], experts: Sequence[Expert]) -> list[MotionClass]:
+        """The one motion, for each run."""
+        assert len(experts) == len(ranges_m)
+        return [self._motion] * len(ranges_m)
+
+
+def policy_for(spec: str) -> Policy:
+    """The policy called ``expert``, ``constant:<class>``, or kept in a checkpoint folder.
+
+    Raises UsageError for an unknown class, CheckpointError for a folder that holds no follow network.
+    """
+    if spec == "expert":
+        return ExpertPolicy()
+    if spec.startswith("constant:"):
+        name = spec.removeprefix("constant:")
+        known = {motion.label: motion for motion in MotionClass}
+        if name not in known:
+            raise UsageError(f"{spec}: no such motion class; the classes are {', '.join(known)}")
+        return ConstantPolicy(known[name])
+    return NetworkPolicy(load_checkpoint(Path(spec)))

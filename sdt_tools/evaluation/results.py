@@ -1,0 +1,94 @@
+"""What a closed-loop run leaves: its outcome, and the trace of how it went."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import polars as pl
+
+from sdt_tools.evaluation.outcome import Outcome
+from sdt_tools.statistics import wilson
+
+RUNS_FILE = "runs.parquet"
+TRACES_FILE = "traces.parquet"
+
+
+@dataclass(frozen=True)
+class TracePoint:
+    """One decision: where robot centre and operator were, what was decided, and how near the nearest thing ahead was.
+
+    Range and bearing of the operator are taken from the LiDAR.
+    """
+
+    time_s: float
+    robot_x_m: float
+    robot_y_m: float
+    robot_yaw_rad: float
+    operator_x_m: float
+    operator_y_m: float
+    operator_range_m: float
+    operator_bearing_rad: float
+    front_range_m: float
+    motion: str
+
+
+@dataclass(frozen=True)
+class RunResult:
+    """One run of one policy; ``simulated_s`` is how long it lasted in the scene."""
+
+    policy: str
+    scenario: str
+    seed: int
+    outcome: Outcome
+    reason: str
+    simulated_s: float
+    trace: tuple[TracePoint, ...]
+    recording: str | None = None
+
+
+@dataclass(frozen=True)
+class Tally:
+    """How one policy did in one scenario."""
+
+    ok: int
+    runs: int
+    wilson: tuple[float, float]
+    outcomes: dict[str, int]
+
+
+def write_results(folder: Path, results: Sequence[RunResult]) -> None:
+    """Write the runs, and their traces, as two Parquet tables."""
+    runs = pl.DataFrame(
+        [
+            {
+                "policy": run.policy,
+                "scenario": run.scenario,
+                "seed": run.seed,
+                "outcome": run.outcome.value,
+                "reason": run.reason,
+                "simulated_s": run.simulated_s,
+                "recording": run.recording,
+            }
+            for run in results
+        ],
+        schema_overrides={"recording": pl.String},
+    )
+    traces = pl.DataFrame(
+        [
+            {"policy": run.policy, "scenario": run.scenario, "seed": run.seed, **vars(point)}
+            for run in results
+            for point in run.trace
+        ]
+    )
+    runs.write_parquet(folder / RUNS_FILE)
+    traces.write_parquet(folder / TRACES_FILE)
+
+
+def tally(runs: pl.DataFrame) -> dict[str, dict[str, Tally]]:
+    """Outcomes counted by policy and scenario, with the Wilson interval of the share that is ok."""
+    result: dict[str, dict[str, Tally]] = {}
+    for (policy, scenario), group in runs.group_by("policy", "scenario", maintain_order=True):
+        counts = {outcome.value: int((group["outcome"] == outcome.value).sum()) for outcome in Outcome}
+        ok = counts[Outcome.OK.value]
+        result.setdefault(str(policy), {})[str(scenario)] = Tally(ok, len(group), wilson(ok, len(group)), counts)
+    return result

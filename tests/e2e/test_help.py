@@ -1,0 +1,37 @@
+import subprocess
+import sys
+
+import pytest
+from typer.main import get_command
+from typer.testing import CliRunner
+
+from sdt_tools.cli.app import VERBS, app
+
+HEAVY = ("cv2", "matplotlib", "mcap", "numba", "numpy", "polars", "pydantic", "pymunk", "rerun", "torch")
+
+
+def every_command() -> list[list[str]]:
+    root = get_command(app)
+    paths = []
+    for verb, command in root.commands.items():  # type: ignore[attr-defined]
+        paths.append([verb])
+        paths += [[verb, name] for name in getattr(command, "commands", {})]
+    return paths
+
+
+def test_every_verb_is_there() -> None:
+    assert [path[0] for path in every_command() if len(path) == 1] == list(VERBS)
+
+
+@pytest.mark.parametrize("path", every_command(), ids=" ".join)
+def test_every_verb_explains_itself_and_takes_json(path: list[str]) -> None:
+    result = CliRunner().invoke(app, [*path, "--help"])
+    assert result.exit_code == 0
+    is_group = any(other[: len(path)] == path and len(other) > len(path) for other in every_command())
+    assert is_group or "--json" in result.output
+
+
+def test_the_command_line_starts_without_heavy_imports() -> None:
+    code = f"import sys, sdt_tools.cli.app; print([m for m in {HEAVY!r} if m in sys.modules])"
+    output = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout
+    assert output.strip() == "[]"
