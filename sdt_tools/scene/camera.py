@@ -1,0 +1,151 @@
+"""The robot's camera in the scene: one picture for each state of the world, the same bytes for the same state."""
+
+from collections.abc import Sequence
+from typing import Final
+
+import cv2
+import numpy as np
+from jaxtyping import Float32, Float64, UInt8
+
+from sdt_tools.frames import Gesture, Pose2D
+from sdt_tools.scene.layout import GestureEvent, Layout
+from sdt_tools.scene.rendering.figure import Figure
+from sdt_tools.scene.rendering.furniture import build_furniture
+from sdt_tools.scene.rendering.light import light_over
+from sdt_tools.scene.rendering.mesh import join
+from sdt_tools.scene.rendering.person import draw_person
+from sdt_tools.scene.rendering.photometry import take_picture
+from sdt_tools.scene.rendering.posture import posture_of
+from sdt_tools.scene.rendering.projection import CameraMount, Pinhole, view_from
+from sdt_tools.scene.rendering.raster import draw
+from sdt_tools.scene.rendering.room import build_room
+from sdt_tools.scene.rendering.texture import TextureBank
+from sdt_tools.scene.seeds import Stream, generator
+
+_FRAMES: Final = 1_000_003
+"""More frames than one recording has, so that no two seeds share their noise."""
+_ARMS_MOVE_S: Final = 0.6
+"""How long arms take from rest to a gesture, and back."""
+
+# One frame runs on one thread; more would fight over the cores with the other processes.
+cv2.setNumThreads(1)
+
+
+class SceneCamera:
+    """Sees ``layout`` from the robot. The person, the room and its colours follow from ``seed``.
+
+    ``seed`` and ``light`` default to the layout's own. ``calibration`` is the lens, ``mount`` its place on the base.
+    It holds the buffers of one picture: share it between no threads. Raises ConfigError for an unknown light.
+    """
+
+    def __init__(self, layout: Layout, seed: int | None = None, light: str | None = None) -> None:
+        self.calibration = Pinhole()
+        self.mount = CameraMount()
+        self._seed = layout.seed if seed is None else seed
+        of_room, of_person, of_light = generator(self._seed, Stream.CAMERA).spawn(3)
+        bounds = _bounds_m(layout)
+        ceiling_m = float(of_room.uniform(2.5, 3.6))
+        self._light = light_over(layout.light if light is None else light, bounds, ceiling_m, of_light)
+        bank = TextureBank()
+        room, room_rims = build_room(layout.walls, bounds, ceiling_m, self._light, bank, of_room)
+        furniture, furniture_rims = build_furniture(layout.boxes, layout.posts, self._light, bank, of_room)
+        plan = layout.operator
+        person = draw_person(of_person, plan.leg_separation_m, plan.leg_radius_m)
+        self._step_m = plan.step_length_m
+        self._figure = Figure(person, bank, of_person)
+        self._solids = join([furniture, room])
+        self._rims = join([room_rims, furniture_rims])
+        self._textures = bank.pack()
+        shape = (self.calibration.height, self.calibration.width)
+        self._radiance = np.zeros((*shape, 3), np.float32)
+        self._inverse_depth = np.zeros(shape, np.float32)
+
+    def render(
+        self,
+        robot: Pose2D,
+        operator: Pose2D,
+        gait_phase: float = 0.0,
+        gait_amplitude: float = 0.0,
+        gesture: Gesture = Gesture.IDLE,
+        gesture_phase: float = 1.0,
+        time_s: float = 0.0,
+        frame: int = 0,
+    ) -> UInt8[np.ndarray, "480 640 3"]:
+        """The picture (blue, green, red) from a robot whose centre is at ``robot``.
+
+        ``gait_phase`` in radians and ``gait_amplitude`` (0 to 1) are the walker's; ``gesture_phase`` runs from 0, arms
+        down, to 1, gesture made; ``time_s`` is for the small movements of one who stands; ``frame`` for the noise.
+        """
+        self._draw(robot, operator, gait_phase, gait_amplitude, gesture, gesture_phase, time_s)
+        return take_picture(self._radiance, self._light.kind, (self._seed * _FRAMES + frame) % 2**63)
+
+    def depth(
+        self,
+        robot: Pose2D,
+        operator: Pose2D,
+        gait_phase: float = 0.0,
+        gait_amplitude: float = 0.0,
+        gesture: Gesture = Gesture.IDLE,
+        gesture_phase: float = 1.0,
+        time_s: float = 0.0,
+    ) -> Float32[np.ndarray, "480 640"]:
+        """Distance along the optical axis of what each pixel of ``render`` shows, metres; infinite for nothing.
+
+        What hangs on walls or under the ceiling is 0.4 % nearer than these.
+        """
+        self._draw(robot, operator, gait_phase, gait_amplitude, gesture, gesture_phase, time_s)
+        with np.errstate(divide="ignore"):
+            return np.float32(1.0) / self._inverse_depth
+
+    def _draw(
+        self,
+        robot: Pose2D,
+        operator: Pose2D,
+        gait_phase: float,
+        gait_amplitude: float,
+        gesture: Gesture,
+        gesture_phase: float,
+        time_s: float,
+    ) -> None:
+        """Fill the buffers: what is near first, so that little is painted twice."""
+        stride_m = gait_amplitude * self._step_m / 2
+        posture = posture_of(self._figure.person, gait_phase, stride_m, gesture, gesture_phase, time_s)
+        figure, shade = self._figure.stand(posture, operator, self._light)
+        view = view_from(robot, self.mount)
+        self._radiance[:] = 0.0
+        self._inverse_depth[:] = 0.0
+        for mesh in (figure, self._solids, self._rims, shade):
+            draw(mesh, self._textures, view, self.calibration, self._radiance, self._inverse_depth)
+
+
+def gesture_of_arms(gestures: Sequence[GestureEvent], time_s: float) -> tuple[Gesture, float]:
+    """The gesture that the arms are making at ``time_s``, and how far they are in it, from 0 to 1.
+
+    Arms rise when a gesture begins and sink when it has ended.
+    """
+    for event in reversed(gestures):
+        if event.at_s <= time_s:
+            rising = (time_s - event.at_s) / _ARMS_MOVE_S
+            sinking = 1.0 - (time_s - event.at_s - event.lasts_s) / _ARMS_MOVE_S
+            return event.gesture, min(1.0, max(0.0, min(rising, sinking)))
+    return Gesture.IDLE, 1.0
+
+
+def encode_jpeg(image_bgr_u8: UInt8[np.ndarray, "height width 3"], quality: int = 80) -> bytes:
+    """``image_bgr_u8`` as a JPEG file."""
+    done, data = cv2.imencode(".jpg", image_bgr_u8, [cv2.IMWRITE_JPEG_QUALITY, quality])
+    assert done, "an 8-bit picture always encodes"
+    return bytes(data)
+
+
+def _bounds_m(layout: Layout) -> Float64[np.ndarray, "4"]:
+    """x0, y0, x1, y1 around everything in ``layout``."""
+    points = np.concatenate(
+        [
+            layout.segments().reshape(-1, 2),
+            layout.circles()[:, :2],
+            np.array(layout.operator.path_m),
+            np.array([(layout.robot.x_m, layout.robot.y_m)]),
+        ]
+    )
+    return np.concatenate([points.min(axis=0), points.max(axis=0)])

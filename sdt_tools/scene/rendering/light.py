@@ -1,0 +1,96 @@
+"""Light of the scene: lamps and their field, and what it does to a surface or a figure."""
+
+import math
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+from jaxtyping import Float64
+
+from sdt_tools.errors import ConfigError
+
+
+@dataclass(frozen=True)
+class LightKind:
+    """A kind of light. ``ambient`` is what comes from everywhere, ``direct`` what comes from lamps or the sun."""
+
+    ambient: float
+    direct: float
+    gain: float
+    """How much light there is, beside a well-lit office."""
+    tint_bgr: tuple[float, float, float]
+    noise_codes: float
+    """Standard deviation of the noise of a middle grey, in steps of 8 bits."""
+    outdoors: bool = False
+
+
+KINDS: Final = {
+    "indoor": LightKind(0.45, 0.60, 1.0, (1.0, 1.0, 1.0), 2.0),
+    "artificial": LightKind(0.30, 0.75, 0.7, (0.72, 0.96, 1.08), 3.2),
+    "dim": LightKind(0.50, 0.45, 0.25, (0.85, 0.95, 1.05), 5.0),
+    "sunlight": LightKind(0.45, 1.30, 2.0, (0.93, 0.99, 1.05), 1.6, outdoors=True),
+}
+
+
+@dataclass(frozen=True, eq=False)
+class Light:
+    """Lamps at fixed places (or one sun, as a lamp that is far away) over an even ambient light."""
+
+    kind: LightKind
+    lamps_m: Float64[np.ndarray, "lamps 3"]
+    power: float
+
+    def at(
+        self, points_m: Float64[np.ndarray, "points 3"], normals: Float64[np.ndarray, "points 3"]
+    ) -> Float64[np.ndarray, "points"]:
+        """Light on surfaces at ``points_m`` that face along unit ``normals``; 1 on a well-lit floor.
+
+        Lamps shine downwards; their light falls with the square of the distance, and nothing casts a shadow.
+        """
+        sky = self.kind.ambient * (0.8 + 0.2 * normals[:, 2])
+        direct = np.zeros(len(points_m))
+        if self.kind.outdoors:
+            sun = self.lamps_m[0] / np.linalg.norm(self.lamps_m[0])
+            direct += np.maximum(normals @ sun, 0.0)
+            return sky + self.power * direct
+        for lamp in self.lamps_m:
+            way = lamp - points_m
+            square = np.maximum((way**2).sum(axis=1), 0.25)
+            # Both cosines carry a 1/distance; the lamp's own falls off downwards only.
+            direct += np.maximum((way * normals).sum(axis=1), 0.0) * np.maximum(way[:, 2], 0.0) / square**2
+        return sky + self.power * direct
+
+    def around(self, point_m: Float64[np.ndarray, "3"]) -> tuple[Float64[np.ndarray, "3"], float]:
+        """The one direction and strength of light that stands for all lamps on a small body at ``point_m``."""
+        if self.kind.outdoors:
+            return self.lamps_m[0] / np.linalg.norm(self.lamps_m[0]), self.power
+        way = self.lamps_m - point_m
+        square = np.maximum((way**2).sum(axis=1), 0.25)
+        pull = (way * (np.maximum(way[:, 2], 0.05) / square**2)[:, None]).sum(axis=0)
+        strength = float(np.linalg.norm(pull))
+        return (pull / strength if strength > 0 else np.array([0.0, 0.0, 1.0])), self.power * strength
+
+
+def light_over(name: str, bounds_m: Float64[np.ndarray, "4"], ceiling_m: float, rng: np.random.Generator) -> Light:
+    """The light called ``name`` over the area x0, y0, x1, y1: rows of lamps under the ceiling, or a sun.
+
+    Raises ConfigError for an unknown name.
+    """
+    kind = KINDS.get(name)
+    if kind is None:
+        raise ConfigError(f"unknown light '{name}'; known are {', '.join(KINDS)}")
+    if kind.outdoors:
+        azimuth, elevation = rng.uniform(0, 2 * math.pi), math.radians(rng.uniform(25, 60))
+        sun = (math.cos(elevation) * math.cos(azimuth), math.cos(elevation) * math.sin(azimuth), math.sin(elevation))
+        return Light(kind, 1e6 * np.array([sun]), kind.direct)
+    spacing = rng.uniform(2.4, 3.4, 2)
+    x0, y0, x1, y1 = bounds_m
+    offset = rng.uniform(0, spacing)
+    xs = np.arange(x0 - spacing[0] + offset[0], x1 + spacing[0], spacing[0])
+    ys = np.arange(y0 - spacing[1] + offset[1], y1 + spacing[1], spacing[1])
+    lamps = np.array([(x, y, ceiling_m - 0.02) for x in xs for y in ys])
+    unit = Light(kind, lamps, 1.0)
+    middle = np.array([[(x0 + x1) / 2 + dx, (y0 + y1) / 2 + dy, 0.0] for dx in (-1, 0, 1) for dy in (-1, 0, 1)])
+    up = np.tile([0.0, 0.0, 1.0], (len(middle), 1))
+    field = float(np.mean(unit.at(middle, up))) - kind.ambient
+    return Light(kind, lamps, kind.direct / field)

@@ -1,0 +1,231 @@
+"""Scenario files: standard worlds in TOML, whose ``{ low, high }`` numbers are drawn from a seed.
+
+Metres, degrees, seconds; x ahead, y left. ``mirror = true`` flips half of the seeds left to right.
+"""
+
+import difflib
+import math
+from pathlib import Path
+from typing import Annotated, Final, Literal
+
+import numpy as np
+from pydantic import BeforeValidator, Field, model_validator
+
+from sdt_tools.config import Config, load_config
+from sdt_tools.errors import ConfigError
+from sdt_tools.frames import Gesture, Pose2D
+from sdt_tools.scene.layout import Box, GestureEvent, Layout, OperatorPlan, Post, Wall
+from sdt_tools.scene.practice import PRACTICE_FAMILIES, practice_layout
+from sdt_tools.scene.seeds import Stream, generator
+from sdt_tools.scene.validity import check_layout
+
+_FOLDER: Final = Path(__file__).parent / "scenarios"
+
+
+class Span(Config):
+    """A number drawn evenly from [low, high)."""
+
+    low: float
+    high: float
+
+    @model_validator(mode="after")
+    def _ordered(self) -> "Span":
+        if self.low > self.high:
+            raise ValueError(f"low = {self.low} is above high = {self.high}")
+        return self
+
+    def draw(self, rng: np.random.Generator) -> float:
+        """One number of the span. A plain number draws too, so that it may become a span without moving others."""
+        return self.low + (self.high - self.low) * float(rng.random())
+
+
+def _as_span(value: object) -> object:
+    if isinstance(value, dict | Span):
+        return value
+    if isinstance(value, int | float) and not isinstance(value, bool):
+        return {"low": value, "high": value}
+    raise ValueError("a number or { low = …, high = … } is needed")
+
+
+Number = Annotated[Span, BeforeValidator(_as_span)]
+Point = tuple[Number, Number]
+
+
+def _fixed(value: float) -> Span:
+    return Span(low=value, high=value)
+
+
+class RobotSpec(Config):
+    """Where the robot's centre starts."""
+
+    x: Number = _fixed(0.0)
+    y: Number = _fixed(0.0)
+    yaw_deg: Number = _fixed(0.0)
+
+
+class OperatorSpec(Config):
+    """What the operator does; his legs and stride are drawn for each seed."""
+
+    path: tuple[Point, ...] = Field(min_length=1)
+    speed_mps: Number = Span(low=0.4, high=0.7)
+    waits_at_lead_m: Number = _fixed(1.8)
+    pauses_s: tuple[Number, ...] = ()
+    """Rest at each point of the path; missing ones are 0."""
+    keeps_away_m: Number = _fixed(0.4)
+    patience_s: Number = _fixed(4.0)
+    leg_radius_m: Number = Span(low=0.05, high=0.075)
+    leg_separation_m: Number = Span(low=0.2, high=0.32)
+    step_length_m: Number = Span(low=0.3, high=0.5)
+
+    @model_validator(mode="after")
+    def _pauses_fit(self) -> "OperatorSpec":
+        if len(self.pauses_s) > len(self.path):
+            raise ValueError(f"{len(self.pauses_s)} pauses_s for {len(self.path)} points of the path")
+        return self
+
+
+class WallSpec(Config):
+    """A wall between two points."""
+
+    from_: Point = Field(alias="from")
+    to: Point
+
+
+class BoxSpec(Config):
+    """A box standing on the floor."""
+
+    x: Number
+    y: Number
+    length: Number
+    width: Number
+    yaw_deg: Number = _fixed(0.0)
+    height: Number = _fixed(0.6)
+
+
+class PostSpec(Config):
+    """A round upright."""
+
+    x: Number
+    y: Number
+    radius: Number
+
+
+class GestureSpec(Config):
+    """A gesture of the operator."""
+
+    at_s: Number
+    gesture: Literal["idle", "enable", "disable"]
+    lasts_s: Number = _fixed(2.0)
+
+
+class Scenario(Config):
+    """A scenario file."""
+
+    name: str
+    timeout_s: float = Field(default=90.0, gt=0)
+    mirror: bool = False
+    robot: RobotSpec = RobotSpec()
+    operator: OperatorSpec
+    wall: tuple[WallSpec, ...] = ()
+    box: tuple[BoxSpec, ...] = ()
+    post: tuple[PostSpec, ...] = ()
+    light: Literal["indoor", "artificial", "sunlight", "dim"] = "indoor"
+    gestures: tuple[GestureSpec, ...] = ()
+
+
+def scenario_names() -> tuple[str, ...]:
+    """The scenarios that come with the package, as the command line names them."""
+    return tuple(sorted(path.stem for path in _FOLDER.glob("*.toml")))
+
+
+def load_scenario(name_or_path: str) -> Scenario:
+    """A scenario of the package by its name, or a file of the user's own (``*.toml``).
+
+    Raises ConfigError for an unknown name, listing those that exist, and for a file that is missing or wrong.
+    """
+    if name_or_path.endswith(".toml"):
+        return load_config(Scenario, Path(name_or_path))
+    known = scenario_names()
+    if name_or_path in known:
+        return load_config(Scenario, _FOLDER / f"{name_or_path}.toml")
+    everything = [*known, *PRACTICE_FAMILIES]
+    near = difflib.get_close_matches(name_or_path, everything, n=1)
+    hint = f"did you mean '{near[0]}'? " if near else ""
+    raise ConfigError(f"unknown scenario '{name_or_path}'; {hint}There are {', '.join(everything)}, or a file *.toml")
+
+
+def layout_for(name_or_path: str, seed: int) -> Layout:
+    """The world of a scenario, a scenario file or a practice family for ``seed``. Raises ConfigError."""
+    if seed < 0:
+        raise ConfigError(f"seed {seed}: seeds are 0 or greater")
+    if name_or_path in PRACTICE_FAMILIES:
+        return practice_layout(seed, PRACTICE_FAMILIES[name_or_path])
+    return draw(load_scenario(name_or_path), seed)
+
+
+def draw(scenario: Scenario, seed: int) -> Layout:
+    """The world of ``scenario`` for ``seed``; the same pair gives the same world.
+
+    Raises ConfigError where things drawn stand in each other's way.
+    """
+    rng = generator(seed, Stream.LAYOUT)
+    side = -1.0 if rng.random() < 0.5 and scenario.mirror else 1.0
+
+    def point(spec: Point) -> tuple[float, float]:
+        return spec[0].draw(rng), side * spec[1].draw(rng)
+
+    def yaw(spec: Span) -> float:
+        return side * math.radians(spec.draw(rng))
+
+    robot = Pose2D(*point((scenario.robot.x, scenario.robot.y)), yaw(scenario.robot.yaw_deg))
+    path = tuple(point(spec) for spec in scenario.operator.path)
+    layout = Layout(
+        name=scenario.name,
+        seed=seed,
+        timeout_s=scenario.timeout_s,
+        robot=robot,
+        operator=_plan(scenario.operator, path, robot, rng),
+        walls=tuple(Wall(*point(spec.from_), *point(spec.to)) for spec in scenario.wall),
+        boxes=tuple(
+            Box(
+                *point((spec.x, spec.y)),
+                length_m=spec.length.draw(rng),
+                width_m=spec.width.draw(rng),
+                yaw_rad=yaw(spec.yaw_deg),
+                height_m=spec.height.draw(rng),
+            )
+            for spec in scenario.box
+        ),
+        posts=tuple(Post(*point((spec.x, spec.y)), radius_m=spec.radius.draw(rng)) for spec in scenario.post),
+        gestures=tuple(
+            sorted(
+                (
+                    GestureEvent(spec.at_s.draw(rng), Gesture[spec.gesture.upper()], spec.lasts_s.draw(rng))
+                    for spec in scenario.gestures
+                ),
+                key=lambda event: event.at_s,
+            )
+        ),
+        light=scenario.light,
+    )
+    check_layout(layout)
+    return layout
+
+
+def _plan(
+    spec: OperatorSpec, path: tuple[tuple[float, float], ...], robot: Pose2D, rng: np.random.Generator
+) -> OperatorPlan:
+    pauses = [pause.draw(rng) for pause in spec.pauses_s]
+    return OperatorPlan(
+        path_m=path,
+        pauses_s=(*pauses, *[0.0] * (len(path) - len(pauses))),
+        speed_mps=spec.speed_mps.draw(rng),
+        waits_at_lead_m=spec.waits_at_lead_m.draw(rng),
+        keeps_away_m=spec.keeps_away_m.draw(rng),
+        patience_s=spec.patience_s.draw(rng),
+        yaw_rad=math.atan2(robot.y_m - path[0][1], robot.x_m - path[0][0]),
+        leg_radius_m=spec.leg_radius_m.draw(rng),
+        leg_separation_m=spec.leg_separation_m.draw(rng),
+        step_length_m=spec.step_length_m.draw(rng),
+        first_phase_rad=2 * math.pi * float(rng.random()),
+    )
