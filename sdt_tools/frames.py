@@ -12,6 +12,8 @@ from typing import Final
 import numpy as np
 from jaxtyping import Float64
 
+from sdt_tools.errors import UsageError
+
 RAYS: Final = 541
 RAY_STEP_RAD: Final = float(np.deg2rad(0.5))
 FIRST_RAY_RAD: Final = float(np.deg2rad(-135.0))
@@ -57,6 +59,14 @@ class MotionClass(IntEnum):
     def mirrored(self) -> "MotionClass":
         """The class for the scene mirrored left to right."""
         return _MIRROR[self]
+
+
+def motion_labelled(label: str) -> MotionClass:
+    """The class called ``label``. Raises UsageError, listing the classes, where there is none."""
+    known = {motion.label: motion for motion in MotionClass}
+    if label not in known:
+        raise UsageError(f"'{label}': no such motion class; the classes are {', '.join(known)}")
+    return known[label]
 
 
 FORWARD_CLASSES: Final = frozenset({MotionClass.FORWARD, MotionClass.LEFT_FORWARD, MotionClass.RIGHT_FORWARD})

@@ -7,6 +7,7 @@ import sys
 from types import ModuleType
 
 import typer
+from typer.core import TyperGroup
 
 from sdt_tools.errors import SdtError
 from sdt_tools.runs.threads import use_one_thread
@@ -14,8 +15,19 @@ from sdt_tools.runs.threads import use_one_thread
 VERBS = ("demo", "record", "inspect", "import", "label", "dataset", "train", "evaluate", "replay", "errors", "view")
 """In the order of the flow. Each is a module here (``import_`` for ``import``) with a ``command``, or an ``app``."""
 
+
+class InOrderOfTheFlow(TyperGroup):
+    """Lists the verbs as data flows through them."""
+
+    def list_commands(self, ctx: object) -> list[str]:
+        """The verbs."""
+        del ctx
+        return [verb for verb in VERBS if verb in self.commands]
+
+
 app = typer.Typer(
     name="sdt",
+    cls=InOrderOfTheFlow,
     help="Record, label, train, drive and replay learned robot controllers, and say why a frame is wrong.",
     no_args_is_help=True,
     pretty_exceptions_enable=False,

@@ -30,7 +30,7 @@ def follow(
     save_runs: Annotated[
         str, typer.Option(help="Keep runs as recordings: none, failed or all, with the expert's advice in them.")
     ] = "none",
-    config: Annotated[Path | None, typer.Option(help="TOML file with [scene] and [success].")] = None,
+    config: Annotated[Path | None, typer.Option(help="TOML file with tables scene and success.")] = None,
     workers: Annotated[int, typer.Option(min=1, help="Processes, one thread each.")] = 2,
     json_output: JsonFlag = False,
 ) -> None:

@@ -193,7 +193,7 @@ def _summary(
         closed_loop=_driven(network)[str(model / stages.MODEL)],
         baselines=_driven(baselines),
         real_time_factor=round(network.real_time_factor, 1),
-        replay_frames_per_s=round(replayed["frames_per_s"]),
+        replay_frames_per_s=round(replayed["frames_per_s"], 1),
         tags=tagged["tags"],
         conditions=tagged["conditions"],
         rrd=str(out / stages.RRD),

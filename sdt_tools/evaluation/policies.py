@@ -7,8 +7,7 @@ from typing import Protocol, runtime_checkable
 import numpy as np
 from jaxtyping import Float64
 
-from sdt_tools.errors import UsageError
-from sdt_tools.frames import MotionClass
+from sdt_tools.frames import MotionClass, motion_labelled
 from sdt_tools.models.checkpoint import load_checkpoint
 from sdt_tools.models.loaded import LoadedModel
 from sdt_tools.protocols import Expert
@@ -66,16 +65,12 @@ class ConstantPolicy:
 
 
 def policy_for(spec: str) -> Policy:
-    """The policy called ``expert``, ``constant:<class>``, or kept in a checkpoint folder.
+    """The policy called ``expert``, ``constant:<class>``, or kept in a checkpoint folder, ``policy:`` before it or not.
 
     Raises UsageError for an unknown class, CheckpointError for a folder that holds no follow network.
     """
     if spec == "expert":
         return ExpertPolicy()
     if spec.startswith("constant:"):
-        name = spec.removeprefix("constant:")
-        known = {motion.label: motion for motion in MotionClass}
-        if name not in known:
-            raise UsageError(f"{spec}: no such motion class; the classes are {', '.join(known)}")
-        return ConstantPolicy(known[name])
-    return NetworkPolicy(load_checkpoint(Path(spec)))
+        return ConstantPolicy(motion_labelled(spec.removeprefix("constant:")))
+    return NetworkPolicy(load_checkpoint(Path(spec.removeprefix("policy:"))))

@@ -83,7 +83,7 @@ def test_an_evaluation_counts_by_model_and_scenario_and_is_not_run_twice(tmp_pat
 @pytest.mark.parametrize(
     ("models", "scenario", "message"),
     [
-        (["constant:fly"], "plain", "constant:fly: no such motion class; the classes are stay, forward"),
+        (["constant:fly"], "plain", "'fly': no such motion class; the classes are stay, forward"),
         (["expert"], "plane", "plane"),
         (["expert", "expert"], "plain", "a model is given twice"),
         ([], "plain", "no model given"),

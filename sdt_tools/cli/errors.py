@@ -1,0 +1,58 @@
+"""``sdt errors``: why frames are wrong."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from sdt_tools.cli.console import JsonFlag, console, emit
+
+
+def command(
+    predictions: Annotated[Path, typer.Argument(metavar="PREDICTIONS", help="File that sdt replay made, with labels.")],
+    recordings: Annotated[
+        list[Path],
+        typer.Option("--recordings", help="The replayed recordings, or folders of them; may be given several times."),
+    ],
+    out: Annotated[Path, typer.Option(help="Folder to write: tags.parquet, errors.json, figures.")],
+    model: Annotated[str | None, typer.Option(help="Model, where the predictions are of several.")] = None,
+    config: Annotated[Path | None, typer.Option(help="TOML file of options, such as loss, eta and epsilon_m.")] = None,
+    json_output: JsonFlag = False,
+) -> None:
+    """Tag every wrong frame: systematic, conditional (and on what), transient, isolated or unexplained."""
+    from sdt_tools.cli.progress import progress_bar
+    from sdt_tools.config import load_config
+    from sdt_tools.error_analysis.analyse import analyse_errors
+    from sdt_tools.error_analysis.definitions import ErrorOptions
+
+    options = load_config(ErrorOptions, config)
+    with progress_bar("reading scans") as progress:
+        report = analyse_errors(predictions, recordings, options, out, model, progress)
+    if json_output:
+        emit({**report.document(), "out": str(out)})
+        return
+    from rich.table import Table
+
+    table = Table("tag", "frames", "share", "95 % interval")
+    for tag, share in report.tags.items():
+        table.add_row(str(tag), f"{share.count:,}", f"{share.share:.2%}", f"{share.low:.2%} to {share.high:.2%}")
+    console.print(table)
+    epsilon_m = report.epsilon.epsilon_m
+    console.print(f"{report.errors:,} errors in {report.frames:,} labelled frames; ε = {epsilon_m:.3g} m")
+    if report.conditions:
+        found = Table("condition", "frames", "mean loss inside", "outside", "p (Holm)")
+        for condition in report.conditions:
+            verdict = condition.verdict
+            found.add_row(
+                verdict.condition.text,
+                f"{condition.frames:,}",
+                f"{verdict.mean_loss_in:.2f}",
+                f"{verdict.mean_loss_out:.2f}",
+                f"{verdict.p_adjusted:.3f}",
+            )
+        console.print(found)
+    else:
+        console.print(report.note or "no condition was confirmed")
+    for warning in report.warnings:
+        console.print(f"[yellow]{warning}")
+    console.print(f"written to {out}", soft_wrap=True)

@@ -1,0 +1,61 @@
+"""``sdt replay``: a model over recordings."""
+
+from enum import StrEnum
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from sdt_tools.cli.console import JsonFlag, console, emit
+
+
+class Every(StrEnum):
+    """Which scans are answered."""
+
+    ALL = "all"
+    LABELLED = "labelled"
+
+
+def command(
+    model: Annotated[Path, typer.Argument(metavar="MODEL", help="Checkpoint folder.")],
+    recordings: Annotated[list[Path], typer.Argument(metavar="REC...", help="Recordings to replay.")],
+    out: Annotated[Path, typer.Option(help="Predictions file to write (Parquet); a .toml beside it says from what.")],
+    labels: Annotated[
+        Path | None, typer.Option(help="Folder of label journals; without it predictions have no loss.")
+    ] = None,
+    every: Annotated[Every, typer.Option(help="Answer all scans, or only those with a label.")] = Every.ALL,
+    batch: Annotated[int, typer.Option(min=1, max=4096, help="Scans answered at once, on one thread.")] = 128,
+    json_output: JsonFlag = False,
+) -> None:
+    """Answer every scan of recordings with a model and keep the predictions, with what is known about each frame."""
+    from sdt_tools.cli.progress import progress_bar
+    from sdt_tools.models.checkpoint import load_checkpoint
+    from sdt_tools.replay.replay import ReplayConfig, replay
+
+    config = ReplayConfig(frames=every.value, batch=batch)
+    loaded = load_checkpoint(model)
+    with progress_bar("replaying") as progress:
+        summary = replay(loaded, recordings, labels, out, config, model, progress)
+    if json_output:
+        emit({**vars(summary), "frames_per_s": round(summary.frames_per_s), "accuracy": summary.accuracy})
+        return
+    from rich.markup import escape
+
+    console.print(
+        f"{summary.frames:,} frames of {summary.recordings} recordings answered by {summary.model} "
+        f"({summary.frames_per_s:,.0f} a second): {summary.out}",
+        soft_wrap=True,
+    )
+    if summary.accuracy is None:
+        console.print("no labels, so no losses" if labels is None else "none of these frames has a label")
+    else:
+        console.print(f"{summary.labelled:,} labelled, {summary.wrong:,} wrong: accuracy {summary.accuracy:.1%}")
+    for what, names in (
+        ("without a label journal", summary.without_journal),
+        ("cut off, read as far as they go", summary.truncated),
+        ("with damaged chunks", summary.damaged),
+    ):
+        if names:
+            console.print(f"[yellow]{what}: {escape(', '.join(names))}")
+    if summary.labels_without_scan:
+        console.print(f"[yellow]{summary.labels_without_scan} labels lie at stamps without a scan")

@@ -1,0 +1,1 @@
+"""Who drives: a network as a driver of the robot."""

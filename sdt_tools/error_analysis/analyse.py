@@ -1,0 +1,60 @@
+"""From a predictions file and its recordings to a folder that says why frames are wrong."""
+
+import json
+import os
+import shutil
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Final
+
+from sdt_tools.error_analysis.definitions import ErrorOptions
+from sdt_tools.error_analysis.explain import explain
+from sdt_tools.error_analysis.figures import draw_epsilon, draw_tags
+from sdt_tools.error_analysis.labelled import load_labelled
+from sdt_tools.error_analysis.recorded import find_recordings, read_situations
+from sdt_tools.error_analysis.report import ErrorReport, summarise, tag_table
+from sdt_tools.errors import OutputExistsError
+from sdt_tools.runs.local import Progress
+from sdt_tools.runs.unit import code_version, content_hash
+
+TAGS: Final = "tags.parquet"
+REPORT: Final = "errors.json"
+EPSILON_FIGURE: Final = "epsilon.png"
+TAGS_FIGURE: Final = "tags.png"
+
+
+def analyse_errors(
+    predictions: Path,
+    recordings: Sequence[Path],
+    options: ErrorOptions,
+    out: Path,
+    model: str | None = None,
+    progress: Progress | None = None,
+) -> ErrorReport:
+    """Tag every labelled frame of ``predictions`` and write the folder ``out``: tags, report, two figures.
+
+    ``recordings`` are MCAP files or folders of them, from which the scans are read again; ``model`` is needed where the
+    predictions are of several. Raises UsageError for predictions that cannot be analysed, RecordingError for recordings
+    that are missing or others, OutputExistsError.
+    """
+    if out.exists():
+        raise OutputExistsError(out)
+    frames = load_labelled(predictions, options, model)
+    paths = find_recordings(frames, recordings)
+    scans = read_situations(frames, paths, options, progress)
+    explanation = explain(frames, scans, options)
+    report = summarise(frames, explanation, options)
+    inputs = {"predictions": content_hash(predictions), "recordings": {path.stem: content_hash(path) for path in paths}}
+    document = {**report.document(), "code_version": code_version(), "inputs": inputs}
+    scratch = out.with_name(f".{out.name}.{os.getpid()}.part")
+    shutil.rmtree(scratch, ignore_errors=True)
+    scratch.mkdir(parents=True)
+    try:
+        tag_table(frames, explanation).write_parquet(scratch / TAGS)
+        (scratch / REPORT).write_text(json.dumps(document, indent=2, ensure_ascii=False) + "\n", "utf-8")
+        draw_epsilon(report.epsilon, scratch / EPSILON_FIGURE)
+        draw_tags(report, scratch / TAGS_FIGURE)
+        scratch.rename(out)
+    finally:
+        shutil.rmtree(scratch, ignore_errors=True)
+    return report

@@ -1,0 +1,40 @@
+"""What a checkpoint says of itself: enough to rebuild the network, and to know what it was made from."""
+
+from collections.abc import Mapping
+from typing import Final
+
+import tomli_w
+from pydantic import Field, JsonValue
+
+from sdt_tools import __version__
+from sdt_tools.config import Config
+from sdt_tools.frames import MotionClass
+from sdt_tools.models.follow_net import FollowNetConfig
+from sdt_tools.models.preprocess import PreprocessConfig
+
+FORMAT: Final = 1
+
+
+class ModelCard(Config):
+    """The content of ``model.toml``.
+
+    ``training`` is the resolved configuration of the training, ``dataset_hash`` that of the data set's manifest,
+    ``metrics`` numbers by name, as in ``val_accuracy``; tables and lists of them are allowed.
+    """
+
+    format: int = FORMAT
+    kind: str
+    classes: tuple[str, ...] = tuple(motion.label for motion in MotionClass)
+    code_version: str = __version__
+    seed: int
+    dataset: str = ""
+    dataset_hash: str = ""
+    architecture: FollowNetConfig
+    preprocess: PreprocessConfig
+    training: Mapping[str, JsonValue] = Field(default_factory=dict)
+    metrics: Mapping[str, JsonValue] = Field(default_factory=dict)
+
+
+def card_to_toml(card: ModelCard) -> str:
+    """The card as TOML text."""
+    return tomli_w.dumps(card.model_dump(mode="json", exclude_none=True))

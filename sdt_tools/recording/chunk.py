@@ -1,0 +1,128 @@
+"""One stretch of messages in an MCAP file, unpacked and walked."""
+
+import struct
+import zlib
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from typing import Final, NamedTuple
+
+import lz4.frame
+import zstandard
+from mcap.opcode import Opcode
+
+MAX_CHUNK_BYTES: Final = 1 << 30
+"""A chunk that claims to be larger is taken for damaged; writers make chunks of about a megabyte."""
+
+_LZ4_MOST: Final = 256
+"""lz4 packs no more than 255 bytes into one."""
+_RECORD_HEAD: Final = struct.Struct("<BQ")
+_CHUNK_HEAD: Final = struct.Struct("<BQQQQII")
+_MESSAGE_HEAD: Final = struct.Struct("<HIQQ")
+
+
+class DamagedChunkError(Exception):
+    """A chunk that cannot be unpacked, or is not what its checksum says."""
+
+
+@dataclass(frozen=True)
+class Segment:
+    """A chunk record, or (``loose``) a run of messages that stand outside chunks.
+
+    ``offset`` and ``length`` take in the record's head. ``index_offsets`` says where the message index of each channel
+    lies; None where that is not known. Times are log times, ``end_ns`` inclusive. A ``cut`` chunk is the file's last,
+    and incomplete.
+    """
+
+    offset: int
+    length: int
+    start_ns: int
+    end_ns: int
+    index_offsets: Mapping[int, int] | None = None
+    loose: bool = False
+    cut: bool = False
+
+    def may_hold(self, channel_ids: frozenset[int]) -> bool:
+        """Whether a message of one of these channels can be in it."""
+        return self.index_offsets is None or not channel_ids.isdisjoint(self.index_offsets)
+
+
+class RawMessage(NamedTuple):
+    """A message that has not been decoded: where its data lies in the buffer that was walked."""
+
+    channel_id: int
+    log_ns: int
+    publish_ns: int
+    start: int
+    end: int
+
+
+def read_segment(view: memoryview, segment: Segment) -> bytes | memoryview:
+    """The records in ``segment`` of the file ``view``; of a cut chunk, what is left of them.
+
+    Raises DamagedChunkError where they cannot be had.
+    """
+    end = segment.offset + segment.length
+    if segment.loose:
+        return view[segment.offset : end]
+    try:
+        *_, size, crc, name_length = _CHUNK_HEAD.unpack_from(view, segment.offset)
+        at = segment.offset + _CHUNK_HEAD.size
+        compression = bytes(view[at : at + name_length]).decode()
+        (data_length,) = struct.unpack_from("<Q", view, at + name_length)
+    except (struct.error, UnicodeDecodeError):
+        if segment.cut:
+            return b""
+        raise DamagedChunkError("its head is unreadable") from None
+    at += name_length + 8
+    if size > MAX_CHUNK_BYTES or (compression == "lz4" and size > _LZ4_MOST * data_length):
+        raise DamagedChunkError(f"it claims {size} bytes, more than it can hold")
+    if at + data_length > end and not segment.cut:
+        raise DamagedChunkError("its data reaches beyond it")
+    data = _decompress(compression, view[at : min(at + data_length, end)], size, segment.cut)
+    if segment.cut:
+        return data
+    if len(data) != size:
+        raise DamagedChunkError(f"it holds {len(data)} bytes where {size} are promised")
+    if crc and zlib.crc32(data) != crc:
+        raise DamagedChunkError("its checksum does not match")
+    return data
+
+
+def walk_messages(data: bytes | memoryview) -> Iterator[RawMessage]:
+    """The messages among the records of an unpacked chunk; stops at a record that is cut off."""
+    at, size = 0, len(data)
+    while at + _RECORD_HEAD.size <= size:
+        opcode, length = _RECORD_HEAD.unpack_from(data, at)
+        at += _RECORD_HEAD.size
+        end = at + length
+        if end > size:
+            return
+        if opcode == Opcode.MESSAGE and length >= _MESSAGE_HEAD.size:
+            channel_id, _, log_ns, publish_ns = _MESSAGE_HEAD.unpack_from(data, at)
+            yield RawMessage(channel_id, log_ns, publish_ns, at + _MESSAGE_HEAD.size, end)
+        at = end
+
+
+def _decompress(compression: str, data: memoryview, size: int, cut: bool) -> bytes | memoryview:
+    try:
+        if compression == "":
+            return data
+        if compression == "lz4":
+            return _unpack_lz4(data, size, cut)
+        if compression == "zstd":
+            return zstandard.ZstdDecompressor().stream_reader(data).read(size)
+    except (RuntimeError, zstandard.ZstdError) as error:
+        if cut:
+            return b""
+        raise DamagedChunkError(f"it does not decompress ({error})") from None
+    raise DamagedChunkError(f"it is compressed with {compression!r}; lz4, zstd and none are known")
+
+
+def _unpack_lz4(data: memoryview, size: int, cut: bool) -> bytes:
+    """At most ``size`` bytes out of an lz4 frame; of a cut one, its whole blocks."""
+    unpacked: bytes
+    if not cut and lz4.frame.get_frame_info(data)["content_size"] == size:
+        unpacked = lz4.frame.decompress(data)
+    else:
+        unpacked = lz4.frame.LZ4FrameDecompressor().decompress(data, max_length=max(size, 1))
+    return unpacked

@@ -1,0 +1,284 @@
+"""An MCAP file, written: chunks, indexes, statistics and checksums as the specification has them.
+
+The container knows nothing of what its messages mean. Each message keeps two times: when it was logged (by the host)
+and when it was published (by the sensor). Schemas and channels stand before the chunks, so that a lost chunk never
+takes them along. Messages gather in two chunks at a time, one compressed (lz4) and one for data that is compressed
+already; both are finished together, so that whoever reads scans alone never touches the images.
+"""
+
+import os
+import struct
+import zlib
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from io import FileIO
+from pathlib import Path
+from typing import Final
+
+import lz4.frame
+from mcap.data_stream import RecordBuilder
+from mcap.opcode import Opcode
+from mcap.records import (
+    Attachment,
+    AttachmentIndex,
+    Channel,
+    ChunkIndex,
+    DataEnd,
+    Footer,
+    Header,
+    McapRecord,
+    Metadata,
+    MetadataIndex,
+    Schema,
+    Statistics,
+    SummaryOffset,
+)
+
+from sdt_tools.errors import OutputExistsError, RecordingError
+
+MAGIC: Final = b"\x89MCAP0\r\n"
+CHUNK_BYTES: Final = 1 << 20
+"""A chunk is finished when it holds this much, before compression."""
+
+_MESSAGE_HEAD: Final = struct.Struct("<BQHIQQ")
+_MESSAGE_FIXED: Final = 22  # channel, sequence, log time, publish time
+_INDEX_ENTRY: Final = struct.Struct("<QQ")
+_INDEX_HEAD: Final = struct.Struct("<BQHI")
+_CHUNK_HEAD: Final = struct.Struct("<BQQQQII")
+_FOOTER_CHECKED: Final = struct.Struct("<BQQQ")
+
+
+@dataclass
+class _OpenChunk:
+    """Messages that are not in the file yet."""
+
+    compressed: bool
+    parts: list[bytes] = field(default_factory=list)
+    size: int = 0
+    start_ns: int = 0
+    end_ns: int = 0
+    indexes: dict[int, bytearray] = field(default_factory=dict)
+
+    def add(self, channel_id: int, sequence: int, log_ns: int, publish_ns: int, data: bytes) -> None:
+        if not self.parts:
+            self.start_ns = self.end_ns = log_ns
+        elif log_ns < self.start_ns:
+            self.start_ns = log_ns
+        elif log_ns > self.end_ns:
+            self.end_ns = log_ns
+        head = _MESSAGE_HEAD.pack(Opcode.MESSAGE, _MESSAGE_FIXED + len(data), channel_id, sequence, log_ns, publish_ns)
+        self.parts += (head, data)
+        index = self.indexes.get(channel_id)
+        if index is None:
+            index = self.indexes[channel_id] = bytearray()
+        index += _INDEX_ENTRY.pack(log_ns, self.size)
+        self.size += len(head) + len(data)
+
+
+class McapFile:
+    """An MCAP file being written; the path must not exist.
+
+    Raises OutputExistsError for a path that does, RecordingError naming path and cause when the disk refuses. After
+    such a refusal the file is cut back to its last whole record, and ``close`` finishes it if there is room for that.
+    """
+
+    def __init__(self, path: Path, library: str, chunk_bytes: int = CHUNK_BYTES) -> None:
+        self.path = path
+        self._chunk_bytes = chunk_bytes
+        self._schemas: dict[str, Schema] = {}
+        self._channels: dict[str, Channel] = {}
+        self._sequences: list[int] = [0]
+        self._chunks = (_OpenChunk(compressed=True), _OpenChunk(compressed=False))
+        self._chunk_indexes: list[ChunkIndex] = []
+        self._attachments: list[AttachmentIndex] = []
+        self._metadata: list[MetadataIndex] = []
+        self._counts: dict[int, int] = {}
+        self._size = 0
+        self._closed = False
+        self._file = _create(path)
+        self._write(MAGIC + _record(Header("", library)))
+
+    @property
+    def size(self) -> int:
+        """Bytes in the file so far."""
+        return self._size
+
+    @property
+    def pending(self) -> int:
+        """Bytes that wait in memory for their chunk to be finished."""
+        return sum(chunk.size for chunk in self._chunks)
+
+    @property
+    def counts(self) -> dict[str, int]:
+        """Messages in the file, by topic; those that wait are not among them."""
+        return {topic: self._counts.get(channel.id, 0) for topic, channel in sorted(self._channels.items())}
+
+    def add_channel(self, topic: str, schema: str, schema_data: bytes) -> int:
+        """Announce a protobuf topic; the number to write its messages with."""
+        known = self._schemas.get(schema)
+        if known is None:
+            known = Schema(len(self._schemas) + 1, schema_data, "protobuf", schema)
+            self._write(_record(known))
+            self._schemas[schema] = known
+        channel = Channel(len(self._channels) + 1, topic, "protobuf", metadata={}, schema_id=known.id)
+        self._write(_record(channel))
+        self._channels[topic] = channel
+        self._sequences.append(0)
+        return channel.id
+
+    def add_message(self, channel_id: int, log_ns: int, publish_ns: int, data: bytes, compress: bool = True) -> None:
+        """Take a message into the open chunk; ``compress`` chooses which one."""
+        self._sequences[channel_id] += 1
+        compressed, plain = self._chunks
+        (compressed if compress else plain).add(channel_id, self._sequences[channel_id], log_ns, publish_ns, data)
+        if compressed.size + plain.size >= self._chunk_bytes:
+            self.finish_chunks()
+
+    def add_metadata(self, name: str, entries: Mapping[str, str]) -> None:
+        """Write a metadata record; chunks that are open stay open."""
+        record = _record(Metadata(name, dict(entries)))
+        self._metadata.append(MetadataIndex(self._write(record), len(record), name))
+
+    def add_attachment(self, name: str, media_type: str, data: bytes, stamp_ns: int) -> None:
+        """Write a file into the file."""
+        record = _record(Attachment(stamp_ns, stamp_ns, name, media_type, data))
+        offset = self._write(record)
+        self._attachments.append(AttachmentIndex(offset, len(record), stamp_ns, stamp_ns, len(data), name, media_type))
+
+    def finish_chunks(self) -> None:
+        """Hand what is pending to the operating system: from here on it survives the end of this process."""
+        chunks, self._chunks = self._chunks, (_OpenChunk(compressed=True), _OpenChunk(compressed=False))
+        for chunk in chunks:
+            if chunk.parts:
+                self._write_chunk(chunk)
+
+    def sync(self) -> None:
+        """Have the disk keep what was handed over: from here on it survives a power cut.
+
+        May be called by another thread.
+        """
+        os.fsync(self._file.fileno())
+
+    def close(self) -> None:
+        """Finish the chunks, write summary and footer, and close; may be called twice."""
+        if self._closed:
+            return
+        self._closed = True
+        try:
+            try:
+                self.finish_chunks()
+            finally:
+                self._write(self._end())
+            os.fsync(self._file.fileno())
+        except OSError as error:
+            raise self._refused(error) from None
+        finally:
+            self._file.close()
+
+    def _write_chunk(self, chunk: _OpenChunk) -> None:
+        plain = b"".join(chunk.parts)
+        compression, data = ("lz4", lz4.frame.compress(plain)) if chunk.compressed else ("", plain)
+        name = compression.encode()
+        length = _CHUNK_HEAD.size - 9 + len(name) + 8 + len(data)
+        checksum = zlib.crc32(plain)
+        head = _CHUNK_HEAD.pack(Opcode.CHUNK, length, chunk.start_ns, chunk.end_ns, len(plain), checksum, len(name))
+        head += name + struct.pack("<Q", len(data))
+        chunk_length = len(head) + len(data)
+        offset = self._size
+        indexes, index_offsets = b"", {}
+        for channel_id, entries in chunk.indexes.items():
+            index_offsets[channel_id] = offset + chunk_length + len(indexes)
+            indexes += _INDEX_HEAD.pack(Opcode.MESSAGE_INDEX, 6 + len(entries), channel_id, len(entries)) + entries
+        self._write(head, data, indexes)
+        self._chunk_indexes.append(
+            ChunkIndex(
+                message_start_time=chunk.start_ns,
+                message_end_time=chunk.end_ns,
+                chunk_start_offset=offset,
+                chunk_length=chunk_length,
+                message_index_offsets=index_offsets,
+                message_index_length=len(indexes),
+                compression=compression,
+                compressed_size=len(data),
+                uncompressed_size=len(plain),
+            )
+        )
+        for channel_id, entries in chunk.indexes.items():
+            self._counts[channel_id] = self._counts.get(channel_id, 0) + len(entries) // _INDEX_ENTRY.size
+
+    def _end(self) -> bytes:
+        data_end = _record(DataEnd(0))
+        summary_start = self._size + len(data_end)
+        summary, offsets = b"", b""
+        for group in self._summary_groups():
+            if group:
+                records = b"".join(map(_record, group))
+                offsets += _record(SummaryOffset(records[0], summary_start + len(summary), len(records)))
+                summary += records
+        offsets_start = summary_start + len(summary)
+        checked = summary + offsets + _FOOTER_CHECKED.pack(Opcode.FOOTER, 20, summary_start, offsets_start)
+        footer = _record(Footer(summary_start, offsets_start, zlib.crc32(checked)))
+        return data_end + summary + offsets + footer + MAGIC
+
+    def _summary_groups(self) -> list[list[McapRecord]]:
+        chunks = self._chunk_indexes
+        statistics = Statistics(
+            message_count=sum(self._counts.values()),
+            schema_count=len(self._schemas),
+            channel_count=len(self._channels),
+            attachment_count=len(self._attachments),
+            metadata_count=len(self._metadata),
+            chunk_count=len(chunks),
+            message_start_time=min((chunk.message_start_time for chunk in chunks), default=0),
+            message_end_time=max((chunk.message_end_time for chunk in chunks), default=0),
+            channel_message_counts=dict(sorted(self._counts.items())),
+        )
+        return [
+            list(self._schemas.values()),
+            list(self._channels.values()),
+            [statistics],
+            list(chunks),
+            list(self._attachments),
+            list(self._metadata),
+        ]
+
+    def _write(self, *parts: bytes) -> int:
+        """Write all of ``parts`` or nothing; the offset they begin at."""
+        offset = self._size
+        try:
+            for part in parts:
+                left = memoryview(part)
+                while left:
+                    left = left[self._file.write(left) :]
+        except OSError as error:
+            os.ftruncate(self._file.fileno(), offset)
+            self._file.seek(offset)
+            raise self._refused(error) from None
+        self._size += sum(map(len, parts))
+        return offset
+
+    def _refused(self, error: OSError) -> RecordingError:
+        return RecordingError(
+            f"{self.path}: cannot be written after {self._size / 1e6:.1f} MB: {error.strerror}; "
+            "make room on that disk or record elsewhere (what was written before is kept)"
+        )
+
+
+def _create(path: Path) -> FileIO:
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise RecordingError(f"{path}: its folder cannot be made: {error.strerror}; choose another --out") from None
+    try:
+        return path.open("xb", buffering=0)
+    except FileExistsError:
+        raise OutputExistsError(path) from None
+    except OSError as error:
+        raise RecordingError(f"{path}: cannot be created: {error.strerror}; choose another --out") from None
+
+
+def _record(record: McapRecord) -> bytes:
+    builder = RecordBuilder()
+    record.write(builder)
+    data: bytes = builder.end()  # type: ignore[no-untyped-call]
+    return data

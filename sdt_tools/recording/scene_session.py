@@ -1,0 +1,91 @@
+"""A recording of the scene, from its configuration to the closed file."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from pathlib import Path
+
+from pydantic import Field
+
+from sdt_tools.clock import FAST_EPOCH_NS, HostClock
+from sdt_tools.config import Config, dump_config
+from sdt_tools.protocols import Driver, Observer
+from sdt_tools.recording.loop import RecordingProgress, RecordingSummary, record
+from sdt_tools.recording.perturb import Perturbation, PerturbConfig
+from sdt_tools.recording.session import random_id
+from sdt_tools.recording.writer import RecordingWriter
+from sdt_tools.scene.config import SceneConfig
+from sdt_tools.scene.layout import Layout
+from sdt_tools.scene.scenario import layout_for
+from sdt_tools.scene.source import SceneSource
+
+
+class SceneRecordingConfig(Config):
+    """All that decides what a recording of the scene holds; attached to it.
+
+    ``driver`` names the driver; ``perturb`` forces random motions on it. With ``realtime`` the host's time runs the
+    scene, else it runs as fast as it can and the same configuration gives the same bytes.
+    """
+
+    scenario: str
+    seed: int = Field(ge=0)
+    seconds: float | None = Field(default=None, gt=0)
+    driver: str = "expert"
+    camera: bool = True
+    realtime: bool = False
+    perturb: PerturbConfig | None = None
+    scene: SceneConfig = SceneConfig()
+
+
+def record_scene(
+    config: SceneRecordingConfig,
+    out: Path,
+    make_driver: Callable[[str, SceneSource], Driver],
+    observers: Sequence[Observer] = (),
+    progress: Callable[[RecordingProgress], None] | None = None,
+) -> RecordingSummary:
+    """Record the scene to ``out``; ``make_driver`` builds the driver of that name for the scene.
+
+    Raises ConfigError for an unknown scenario, OutputExistsError, RecordingError where the disk refuses, and what
+    ``make_driver`` raises.
+    """
+    clock = HostClock()
+    layout = layout_for(config.scenario, config.seed)
+    if config.realtime:
+        _warm_up(layout, config)
+    start_ns = clock.now_ns() if config.realtime else FAST_EPOCH_NS
+    source = SceneSource(layout, config.scene, config.camera, start_ns)
+    driver = make_driver(config.driver, source)
+    rates = config.scene.rates
+    perturb = Perturbation(config.seed, config.perturb, rates.follow_hz) if config.perturb is not None else None
+    with RecordingWriter(
+        out,
+        source.info,
+        dump_config(config),
+        recording_id=random_id() if config.realtime else None,
+        start_ns=start_ns,
+        realtime=config.realtime,
+    ) as writer:
+        summary = record(
+            source,
+            source,
+            driver,
+            source.expert,
+            writer,
+            observers,
+            rates,
+            config.scene.motions,
+            config.seconds,
+            config.realtime,
+            clock,
+            perturb,
+            progress,
+        )
+    return replace(summary, size_bytes=writer.size)
+
+
+def _warm_up(layout: Layout, config: SceneRecordingConfig) -> None:
+    """Import and compile what the scene needs, so that it can keep the pace from its first second on."""
+    scene = SceneSource(layout, config.scene, config.camera)
+    for _ in scene.read(scene.start_ns):
+        pass
+    scene.expert.advise()

@@ -1,0 +1,184 @@
+"""What was said of a recording's scans: the labels, and for each model its predictions, losses and error tags."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import polars as pl
+from jaxtyping import Float64, Int64
+
+from sdt_tools.errors import UsageError
+from sdt_tools.view.palette import CORRECT, ERROR, STATUSES, UNLABELED
+from sdt_tools.view.timeline import held
+
+KEY = ("recording_id", "model", "stamp_ns")
+"""What a row of predictions and a row of tags share."""
+
+
+@dataclass(frozen=True, eq=False)
+class Labels:
+    """Labels at the stamps of scans, in order."""
+
+    stamps_ns: Int64[np.ndarray, "labels"]
+    names: tuple[str, ...]
+
+
+@dataclass(frozen=True, eq=False)
+class ModelTrack:
+    """One model over one recording, in order of stamps.
+
+    ``labels`` are empty where a frame has none; ``loss`` (cross-entropy, nats) is NaN there. ``tags`` are empty where
+    nothing was analysed.
+    """
+
+    model: str
+    stamps_ns: Int64[np.ndarray, "frames"]
+    predicted: tuple[str, ...]
+    labels: tuple[str, ...]
+    loss: Float64[np.ndarray, "frames"]
+    tags: tuple[str, ...]
+
+    @property
+    def has_tags(self) -> bool:
+        """Whether an error analysis says anything about this track."""
+        return any(self.tags)
+
+    def statuses(self) -> tuple[str, ...]:
+        """Of each frame what is known: its tag; without one, whether it is correct; without a label, ``unlabeled``."""
+        return tuple(
+            tag or (UNLABELED if not label else CORRECT if label == predicted else ERROR)
+            for predicted, label, tag in zip(self.predicted, self.labels, self.tags, strict=True)
+        )
+
+
+def labels_of(frame: pl.DataFrame | None) -> Labels:
+    """Resolved labels (columns stamp_ns and label); what is unresolved is left out."""
+    if frame is None:
+        return Labels(np.empty(0, np.int64), ())
+    known = frame.select("stamp_ns", "label").filter(pl.col("label").fill_null("") != "").sort("stamp_ns")
+    return Labels(known["stamp_ns"].to_numpy(), tuple(known["label"].to_list()))
+
+
+def models_of(
+    recording_id: str, predictions: Sequence[pl.DataFrame], tags: Sequence[pl.DataFrame], labels: Labels
+) -> tuple[ModelTrack, ...]:
+    """The tracks of all models over the recording ``recording_id``, in the order in which they are first given.
+
+    Frames of predictions hold the columns recording_id, stamp_ns, model, label, predicted and loss_ce; those of tags
+    the same key and tag. Rows of other recordings are passed over. Where predictions were made without labels,
+    ``labels`` take their place; the loss stays unknown.
+
+    Raises UsageError where all predictions are about other recordings, and for an unknown tag.
+    """
+    ours = [frame.filter(pl.col("recording_id") == recording_id) for frame in predictions]
+    columns = [*KEY, "label", "predicted", "loss_ce"]
+    rows = pl.concat([frame.select(columns) for frame in ours]) if ours else pl.DataFrame(schema=columns)
+    if predictions and rows.is_empty():
+        raise UsageError(_nothing_about(recording_id, predictions))
+    if rows.is_empty():
+        return ()
+    rows = rows.unique(KEY, keep="last", maintain_order=True)
+    rows = rows.join(_tags_by_frame(tags), on=list(KEY), how="left", maintain_order="left")
+    known = pl.DataFrame(
+        {"stamp_ns": labels.stamps_ns, "given": list(labels.names)}, {"stamp_ns": pl.Int64, "given": pl.String}
+    )
+    rows = rows.join(known, on="stamp_ns", how="left", maintain_order="left")
+    rows = rows.with_columns(pl.coalesce("label", "given").fill_null("").alias("label"), pl.col("tag").fill_null(""))
+    return tuple(_track(frame) for frame in rows.partition_by("model", maintain_order=True))
+
+
+def _nothing_about(recording_id: str, predictions: Sequence[pl.DataFrame]) -> str:
+    others = (
+        pl.concat([frame.select("recording_id") for frame in predictions])["recording_id"].unique().sort().to_list()
+    )
+    named = ", ".join(others[:3]) + (" …" if len(others) > 3 else "")
+    return (
+        f"none of the predictions is about recording {recording_id}; they are about {named or 'nothing'}: "
+        "replay the model over this recording first"
+    )
+
+
+def _tags_by_frame(tags: Sequence[pl.DataFrame]) -> pl.DataFrame:
+    schema = {"recording_id": pl.String, "model": pl.String, "stamp_ns": pl.Int64, "tag": pl.String}
+    frames = [frame.select(pl.col(name).cast(dtype) for name, dtype in schema.items()) for frame in tags]
+    table = pl.concat([pl.DataFrame(schema=schema), *frames]).unique(KEY, keep="last", maintain_order=True)
+    unknown = sorted(set(table["tag"].drop_nulls().to_list()) - set(STATUSES))
+    if unknown:
+        raise UsageError(f"unknown error tag '{unknown[0]}'; it is one of {', '.join(STATUSES)}")
+    return table
+
+
+def _track(rows: pl.DataFrame) -> ModelTrack:
+    rows = rows.sort("stamp_ns")
+    return ModelTrack(
+        model=str(rows["model"][0]),
+        stamps_ns=rows["stamp_ns"].to_numpy(),
+        predicted=tuple(rows["predicted"].to_list()),
+        labels=tuple(rows["label"].to_list()),
+        loss=rows["loss_ce"].cast(pl.Float64).fill_null(np.nan).to_numpy(),
+        tags=tuple(rows["tag"].to_list()),
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class Judged:
+    """The frames of a model of which something is known, and what."""
+
+    stamps_ns: Int64[np.ndarray, "judged"]
+    statuses: tuple[str, ...]
+
+    def at(self, stamps_ns: Int64[np.ndarray, "rows"]) -> list[str]:
+        """What is known at other stamps.
+
+        Labels are often sparser than scans: the word on a labelled frame holds for the scans just after it, as it does
+        in the lanes.
+        """
+        rows = held(self.stamps_ns, stamps_ns).tolist()
+        return [self.statuses[row] if row >= 0 else UNLABELED for row in rows]
+
+
+def judge(track: ModelTrack) -> Judged:
+    """What is known of a model's frames."""
+    statuses = track.statuses()
+    rows = [row for row, status in enumerate(statuses) if status != UNLABELED]
+    return Judged(track.stamps_ns[np.array(rows, np.int64)], tuple(statuses[row] for row in rows))
+
+
+NOTHING_JUDGED = Judged(np.empty(0, np.int64), ())
+
+
+@dataclass(frozen=True)
+class ErrorRun:
+    """Wrong frames in a row with the same answer, label and tag."""
+
+    stamp_ns: int
+    frames: int
+    predicted: str
+    label: str
+    tag: str
+
+    def text(self) -> str:
+        """One line for the log."""
+        frames = "1 frame" if self.frames == 1 else f"{self.frames} frames"
+        return f"{self.tag or ERROR}: says {self.predicted}, label {self.label} ({frames})"
+
+
+def error_runs(track: ModelTrack) -> list[ErrorRun]:
+    """The errors of a track, one entry for a run of labelled frames that are wrong in the same way."""
+    runs: list[ErrorRun] = []
+    last: tuple[str, str, str] | None = None
+    rows = zip(track.stamps_ns.tolist(), track.predicted, track.labels, track.tags, strict=True)
+    for stamp_ns, predicted, label, tag in rows:
+        if not label:
+            continue
+        kind = (predicted, label, tag) if predicted != label else None
+        if kind is None:
+            last = None
+            continue
+        if kind == last:
+            newest = runs.pop()
+            runs.append(ErrorRun(newest.stamp_ns, newest.frames + 1, predicted, label, tag))
+        else:
+            runs.append(ErrorRun(stamp_ns, 1, predicted, label, tag))
+        last = kind
+    return runs

@@ -1,0 +1,179 @@
+"""A whole recording as one .rrd: scans, camera, truth, labels, predictions and tags on one timeline."""
+
+import shutil
+import time
+import warnings
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Final
+
+import numpy as np
+import polars as pl
+import rerun as rr
+from rerun.chunk import RrdReader
+
+from sdt_tools.config import MotionConfig
+from sdt_tools.errors import OutputExistsError, RunError, UsageError
+from sdt_tools.frames import RAYS, CameraImage
+from sdt_tools.recording.reader import Recording
+from sdt_tools.recording.topics import CAMERA_IMAGE
+from sdt_tools.view.blueprint import Content, blueprint
+from sdt_tools.view.camera_view import send_images
+from sdt_tools.view.decisions import NOTHING_JUDGED, judge
+from sdt_tools.view.map_view import draw_surroundings, map_bounds
+from sdt_tools.view.scan_view import send_scans, style_scans
+from sdt_tools.view.story import Story, draw_story, gather_story, has_log, has_losses, legend
+from sdt_tools.view.survey import survey
+from sdt_tools.view.timeline import when
+
+SCANS_AT_ONCE: Final = 512
+IMAGES_AT_ONCE: Final = 64
+SCANS_ON_MAP: Final = 150
+
+
+@dataclass(frozen=True)
+class ViewSummary:
+    """What went into an .rrd. ``lanes`` are entities; a recording that is ``truncated`` is shown as far as it goes."""
+
+    out: Path
+    recording_id: str
+    scans: int
+    scans_shown: int
+    images: int
+    models: tuple[str, ...]
+    lanes: tuple[str, ...]
+    truncated: bool
+    seconds: float
+
+
+def write_rrd(
+    recording: Path,
+    out: Path,
+    *,
+    labels: pl.DataFrame | None = None,
+    predictions: Sequence[pl.DataFrame] = (),
+    tags: Sequence[pl.DataFrame] = (),
+    every: int = 1,
+    motions: MotionConfig | None = None,
+) -> ViewSummary:
+    """Write ``recording`` with all that is known of it to ``out``, its layout inside.
+
+    ``labels`` are resolved (stamp_ns, label); ``predictions`` and ``tags`` have the columns of prediction files and of
+    tag files, of any number of models and recordings: rows of other recordings are passed over. The first model colours
+    the scans. ``every`` shows one scan in so many; ``motions`` shapes the arrows.
+
+    Raises OutputExistsError; UsageError for ``every`` below 1 and for predictions of which none is about ``recording``;
+    RecordingError where there is nothing to read; RunError where the disk does not take it all.
+    """
+    began = time.perf_counter()
+    if every < 1:
+        raise UsageError(f"every = {every}; show every scan with 1, one in five with 5")
+    if out.exists():
+        raise OutputExistsError(out)
+    with Recording.open(recording) as source:
+        scans = survey(source.scan_batches(SCANS_AT_ONCE))
+        story = gather_story(source, scans, labels, predictions, tags, motions or MotionConfig())
+        out.parent.mkdir(parents=True, exist_ok=True)
+        partial = out.with_name(f".{out.name}.partial")
+        try:
+            shown, images = _write(partial, out.stem, source, story, every)
+            partial.replace(out)
+        finally:
+            partial.unlink(missing_ok=True)
+        return ViewSummary(
+            out=out,
+            recording_id=source.recording_id,
+            scans=len(scans.stamps_ns),
+            scans_shown=shown,
+            images=images,
+            models=tuple(track.model for track in story.models),
+            lanes=tuple(lane.entity for lane in story.lanes),
+            truncated=source.truncated,
+            seconds=time.perf_counter() - began,
+        )
+
+
+def _write(path: Path, name: str, source: Recording, story: Story, every: int) -> tuple[int, int]:
+    """Log all of it to ``path``; returns how many scans and images.
+
+    A viewer keeps one layout an application, so each file is one: opened beside others, it keeps its own.
+    """
+    identity = f"{source.recording_id}/{name}"
+    stream = rr.RecordingStream(f"sdt {name}", recording_id=identity, send_properties=False)
+    stream.save(path, default_blueprint=blueprint(_content(source, story)))
+    try:
+        stream.send_recording_name(source.stem)
+        draw_story(stream, story)
+        counts = _draw_scans(stream, source, story, every), _draw_images(stream, source, story)
+    finally:
+        stream.disconnect()
+    _check_whole(path)
+    return counts
+
+
+def _check_whole(path: Path) -> None:
+    """What fails while a file is written goes to Rerun's own log; a file that is whole ends with a manifest."""
+    try:
+        with warnings.catch_warnings(action="error"):
+            RrdReader(path).store()
+    except (RuntimeError, ValueError, OSError, Warning) as error:
+        free_mb = shutil.disk_usage(path.parent).free / 1e6
+        raise RunError(
+            f"{path.parent}: the .rrd could not be written whole ({free_mb:,.0f} MB free); make room, or show fewer scans "
+            "with --every"
+        ) from error
+
+
+def _content(source: Recording, story: Story) -> Content:
+    robot, operator = story.tracks.robot, story.tracks.operator
+    return Content(
+        reach_m=story.scans.reach_m,
+        legend_lines=len(legend(story)),
+        camera=CAMERA_IMAGE in source.topics,
+        lanes=bool(story.lanes),
+        losses=has_losses(story),
+        log=has_log(story),
+        map_bounds=map_bounds([robot, operator]) if len(robot.stamps_ns) else None,
+    )
+
+
+def _draw_scans(stream: rr.RecordingStream, source: Recording, story: Story, every: int) -> int:
+    """One scan in ``every``; a few, spread over the recording, go into the map."""
+    scan_ns, reach_m = story.scans.stamps_ns, story.scans.reach_m
+    judged = judge(story.models[0]) if story.models else NOTHING_JUDGED
+    on_map = np.unique(np.linspace(0, max(0, len(scan_ns) - 1), SCANS_ON_MAP).astype(np.int64))
+    kept_ns, kept_m = [np.empty(0, np.int64)], [np.empty((0, RAYS))]
+    style_scans(stream)
+    seen = shown = 0
+    for batch in source.scan_batches(SCANS_AT_ONCE):
+        numbers = np.arange(seen, seen + len(batch))
+        chosen, kept = numbers % every == 0, np.isin(numbers, on_map)
+        rows = when(batch.stamps_ns[chosen], scan_ns)
+        send_scans(stream, rows, batch.ranges_m[chosen], judged.at(rows.stamps_ns), reach_m)
+        kept_ns.append(batch.stamps_ns[kept])
+        kept_m.append(batch.ranges_m[kept])
+        seen, shown = seen + len(batch), shown + len(rows)
+    robot, mount = story.tracks.robot, story.notes.mount
+    draw_surroundings(stream, np.concatenate(kept_m), np.concatenate(kept_ns), robot, mount)
+    return shown
+
+
+def _draw_images(stream: rr.RecordingStream, source: Recording, story: Story) -> int:
+    """All images, some at a time."""
+    count = 0
+    waiting: list[CameraImage] = []
+    for received in source.messages([CAMERA_IMAGE]):
+        assert isinstance(received.message, CameraImage)
+        waiting.append(received.message)
+        count += 1
+        if len(waiting) == IMAGES_AT_ONCE:
+            _send_waiting(stream, waiting, story)
+            waiting = []
+    _send_waiting(stream, waiting, story)
+    return count
+
+
+def _send_waiting(stream: rr.RecordingStream, images: list[CameraImage], story: Story) -> None:
+    stamps_ns = np.array([image.stamp_ns for image in images], np.int64)
+    send_images(stream, when(stamps_ns, story.scans.stamps_ns), images)

@@ -1,0 +1,90 @@
+"""What each colour means: one place, so that points, lanes, curves and the legend agree."""
+
+from collections.abc import Iterable
+from typing import Final
+
+import numpy as np
+from jaxtyping import UInt32
+
+from sdt_tools.frames import Gesture, LogLevel, Mode, MotionClass
+
+Rgb = tuple[int, int, int]
+
+BACKGROUND: Final[Rgb] = (16, 18, 24)
+FAINT: Final[Rgb] = (62, 68, 80)
+QUIET: Final[Rgb] = (120, 128, 142)
+WALLS: Final[Rgb] = (88, 98, 116)
+ROBOT: Final[Rgb] = (225, 230, 238)
+ZONE: Final[Rgb] = (255, 82, 82)
+OPERATOR: Final[Rgb] = (255, 171, 64)
+LABEL: Final[Rgb] = (245, 245, 245)
+CODE: Final[Rgb] = (96, 102, 112)
+"""Rays on which the sensor gave a code in place of a distance."""
+
+UNLABELED: Final = "unlabeled"
+CORRECT: Final = "correct"
+ERROR: Final = "error"
+
+STATUSES: Final[dict[str, Rgb]] = {
+    UNLABELED: (150, 176, 205),
+    CORRECT: (88, 196, 110),
+    ERROR: (244, 67, 54),
+    "systematic": (233, 30, 140),
+    "conditional": (255, 152, 0),
+    "transient": (255, 235, 59),
+    "isolated": (38, 198, 218),
+    "unexplained": (171, 96, 230),
+}
+"""What is known of a frame: nothing, right, wrong, or wrong for a reason (the error tags)."""
+
+MODELS: Final[tuple[Rgb, ...]] = (
+    (64, 169, 255),
+    (255, 196, 61),
+    (230, 120, 210),
+    (120, 220, 180),
+    (200, 160, 120),
+    (150, 150, 255),
+)
+"""Models, in the order given; they repeat after the last."""
+
+MOTIONS: Final[dict[str, Rgb]] = {
+    MotionClass.STAY.label: (130, 138, 150),
+    MotionClass.FORWARD.label: (76, 160, 92),
+    MotionClass.LEFT_FORWARD.label: (32, 150, 160),
+    MotionClass.RIGHT_FORWARD.label: (140, 170, 60),
+    MotionClass.BACKWARD.label: (200, 84, 84),
+    MotionClass.LEFT_BACKWARD.label: (150, 96, 190),
+    MotionClass.RIGHT_BACKWARD.label: (214, 136, 60),
+}
+
+GESTURES: Final[dict[str, Rgb]] = {
+    Gesture.IDLE.label: (132, 140, 154),
+    Gesture.ENABLE.label: (76, 160, 92),
+    Gesture.DISABLE.label: (200, 84, 84),
+}
+
+MODES: Final[dict[str, Rgb]] = {
+    Mode.IDLE.label: (132, 140, 154),
+    Mode.ACTIVE.label: (64, 132, 214),
+}
+
+ANSWERS: Final = MOTIONS | GESTURES
+"""All that a model can answer."""
+
+LOG_LEVELS: Final[dict[LogLevel, str]] = {
+    LogLevel.DEBUG: "DEBUG",
+    LogLevel.INFO: "INFO",
+    LogLevel.WARNING: "WARN",
+    LogLevel.ERROR: "ERROR",
+}
+"""Severities by the names that Rerun has for them."""
+
+
+def model_color(index: int) -> Rgb:
+    """The colour of the model that was given as number ``index``."""
+    return MODELS[index % len(MODELS)]
+
+
+def packed(colors: Iterable[Rgb]) -> UInt32[np.ndarray, "colors"]:
+    """Colours as Rerun stores them: 0xRRGGBBAA."""
+    return np.array([red << 24 | green << 16 | blue << 8 | 0xFF for red, green, blue in colors], np.uint32)
