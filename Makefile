@@ -28,7 +28,7 @@ imports: $(READY)
 	$(BIN)/lint-imports
 
 bench: $(READY)
-	$(BIN)/python -m pytest tests/bench --benchmark-enable --benchmark-only -q
+	$(BIN)/python -m pytest tests/bench --benchmark-enable --benchmark-only -q --jaxtyping-packages= -p no:xdist
 
 $(READY): pyproject.toml constraints.txt
 	test -x $(BIN)/python || $(PYTHON) -m venv $(VENV)

@@ -72,6 +72,5 @@ class DecisionLoop:
             motion=motion,
             twist=self._motions.twist(motion),
             driver=PERTURBATION if forced else deciders.driver.name,
-            intervention=forced,
             expert=expert,
         )

@@ -14,6 +14,10 @@ import pytest
 from sdt_tools.cli.app import main
 from sdt_tools.cli.recording_progress import describe
 from sdt_tools.frames import MotionCommand
+from sdt_tools.models.card import ModelCard
+from sdt_tools.models.checkpoint import load_checkpoint, save_checkpoint
+from sdt_tools.models.follow_net import FollowNet, FollowNetConfig, new_follow_net
+from sdt_tools.models.preprocess import PreprocessConfig
 from sdt_tools.recording.loop import RecordingProgress
 from sdt_tools.recording.reader import Recording
 
@@ -69,29 +73,22 @@ def test_a_constant_driver_drives(tmp_path: Path, monkeypatch: pytest.MonkeyPatc
     assert {(c.motion.label, c.driver) for c in commands} == {("backward", "constant:backward")}  # type: ignore[union-attr]
 
 
-class NearestRay:
-    """Stands in for a network: its largest logit says in which seventh of the scan the nearest ray lies."""
-
-    name = "nearest"
-
-    def predict_logits(self, ranges_m: np.ndarray) -> np.ndarray:
-        nearest = np.where(ranges_m < 0.05, 20.0, ranges_m)[:, :539].reshape(len(ranges_m), 7, 77).min(axis=2)
-        return (-nearest).astype(np.float32)
-
-
 def test_a_network_drives(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    network = new_follow_net(FollowNetConfig(), PreprocessConfig(), seed=1).eval()
+    card = ModelCard(kind=FollowNet.kind, seed=1, architecture=network.architecture, preprocess=network.preprocess)
+    save_checkpoint(tmp_path / "untrained", network, card)
     out = tmp_path / "x.mcap"
-    monkeypatch.setattr("sdt_tools.models.checkpoint.load_checkpoint", lambda folder: NearestRay())
-    assert sdt(monkeypatch, *SHORT, "--seconds", 1, "--driver", "policy:some/model", "--out", out) == 0
+    driver = f"policy:{tmp_path / 'untrained'}"
+    assert sdt(monkeypatch, *SHORT, "--seconds", 1, "--driver", driver, "--out", out) == 0
     with Recording.open(out) as recording:
         commands = [m.message for m in recording.messages(["/robot/command"])]
         scans = recording.scans()
+    answers = load_checkpoint(tmp_path / "untrained").predict_logits(scans.ranges_m).argmax(axis=1)
     assert len(commands) == 10
     for command in commands:
         assert isinstance(command, MotionCommand)
-        row = int(np.searchsorted(scans.stamps_ns, command.stamp_ns))
-        assert command.motion == NearestRay().predict_logits(scans.ranges_m[row : row + 1]).argmax()
-        assert command.driver == "policy:nearest"
+        assert command.motion == answers[np.searchsorted(scans.stamps_ns, command.stamp_ns)]
+        assert command.driver == "policy:untrained"
 
 
 def test_progress_is_one_line_with_rates_and_losses() -> None:

@@ -57,6 +57,13 @@ def label(path: Path, source: AutoSource, kind: LabelKind = LabelKind.MOTION) ->
     return label_automatically(path, kind, source, path.parent / "labels").appended
 
 
+def test_motions_that_were_forced_on_the_driver_are_no_labels(tmp_path: Path) -> None:
+    forced = command(200, MotionClass.BACKWARD, driver="perturbation")
+    path = record(tmp_path / "a.mcap", [scan(100), command(100, MotionClass.FORWARD), scan(200), forced])
+    assert label(path, LabelSource.COMMAND) == 1
+    assert labelled(path) == [(100, "forward", "command", "keyboard")]
+
+
 def test_commands_given_in_active_mode_become_labels_of_their_scans(tmp_path: Path) -> None:
     path = record(
         tmp_path / "drive.mcap",

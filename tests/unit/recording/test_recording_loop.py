@@ -362,6 +362,6 @@ def test_forced_commands_say_so(tmp_path: Path) -> None:
     commands = [m.message for m in setup.read() if isinstance(m.message, MotionCommand)]
     assert summary.forced == summary.decisions == len(commands) == 10
     assert {(c.motion, c.driver, c.intervention, c.expert) for c in commands} == {
-        (MotionClass.STAY, "perturbation", True, MotionClass.BACKWARD)
+        (MotionClass.STAY, "perturbation", False, MotionClass.BACKWARD)
     }
     assert set(setup.wheels.twists) == {Twist(0.0, 0.0)}
