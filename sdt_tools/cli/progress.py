@@ -27,22 +27,24 @@ _COLUMNS = (
 
 @contextmanager
 def progress_bar(what: str) -> Iterator[Callable[[int, int], None]]:
-    """A function to call with (done, total); the bar goes when the block ends."""
-    with Progress(*_COLUMNS, console=console, transient=True) as bar:
+    """A function to call with (done, total); the bar goes when the block ends, and shows on terminals only."""
+    with Progress(*_COLUMNS, console=console, transient=True, disable=not console.is_terminal) as bar:
         task = bar.add_task(what, total=None)
         yield lambda done, total: bar.update(task, completed=done, total=total)
 
 
 @contextmanager
 def stage_progress() -> Iterator[Callable[[str, int, int], None]]:
-    """A function to call with (stage, done, total): one bar a stage, which is full when the next one begins."""
-    with Progress(*_COLUMNS, console=console) as bar:
+    """A function to call with (stage, done, total): one bar a stage, full when the next begins; else its name alone."""
+    with Progress(*_COLUMNS, console=console, disable=not console.is_terminal) as bar:
         tasks: dict[str, TaskID] = {}
 
         def report(stage: str, done: int, total: int) -> None:
             if stage not in tasks:
                 _fill(bar, tasks)
                 tasks[stage] = bar.add_task(stage)
+                if not console.is_terminal:
+                    console.print(stage)
             bar.update(tasks[stage], completed=done, total=total)
 
         yield report

@@ -23,7 +23,7 @@ def recording_progress(what: str) -> Iterator[Callable[[RecordingProgress], None
         TextColumn("eta"),
         TimeRemainingColumn(),
     )
-    with Progress(*columns, console=console, transient=True) as bar:
+    with Progress(*columns, console=console, transient=True, disable=not console.is_terminal) as bar:
         task = bar.add_task(what, total=None, state="")
         yield lambda now: bar.update(task, completed=now.recorded_s, total=now.total_s, state=describe(now))
 

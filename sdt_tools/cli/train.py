@@ -50,7 +50,7 @@ def follow(
         TextColumn("eta"),
         TimeRemainingColumn(),
     )
-    with Progress(*columns, console=console, transient=True) as bar:
+    with Progress(*columns, console=console, transient=True, disable=not console.is_terminal) as bar:
         task = bar.add_task("", total=settings.loop.epochs)
 
         def show(record: EpochRecord, total: int) -> None:

@@ -29,7 +29,6 @@ LANES: Final = ("label", "model/**", "operator/**", "robot/**")
 """The lanes stand in the order of their names, with the name as it is: label, model, operator, robot."""
 
 LOSS: Final = "loss"
-SENSOR: Final = "sensor"
 FRONT_RANGE: Final = "sensor/front_range_m"
 CODE_SHARE: Final = "sensor/codes_percent"
 SPEED: Final = "sensor/speed_mps"

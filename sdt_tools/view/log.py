@@ -1,8 +1,6 @@
 """A whole recording as one .rrd: scans, camera, truth, labels, predictions and tags on one timeline."""
 
-import shutil
 import time
-import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -11,10 +9,9 @@ from typing import Final
 import numpy as np
 import polars as pl
 import rerun as rr
-from rerun.chunk import RrdReader
 
 from sdt_tools.config import MotionConfig
-from sdt_tools.errors import OutputExistsError, RunError, UsageError
+from sdt_tools.errors import OutputExistsError, UsageError
 from sdt_tools.frames import RAYS, CameraImage
 from sdt_tools.recording.reader import Recording
 from sdt_tools.recording.topics import CAMERA_IMAGE
@@ -22,6 +19,7 @@ from sdt_tools.view.blueprint import Content, blueprint
 from sdt_tools.view.camera_view import send_images
 from sdt_tools.view.decisions import NOTHING_JUDGED, judge
 from sdt_tools.view.map_view import draw_surroundings, map_bounds
+from sdt_tools.view.rrd_file import RrdFile
 from sdt_tools.view.scan_view import send_scans, style_scans
 from sdt_tools.view.story import Story, draw_story, gather_story, has_log, has_losses, legend
 from sdt_tools.view.survey import survey
@@ -99,30 +97,11 @@ def _write(path: Path, name: str, source: Recording, story: Story, every: int) -
 
     A viewer keeps one layout an application, so each file is one: opened beside others, it keeps its own.
     """
-    identity = f"{source.recording_id}/{name}"
-    stream = rr.RecordingStream(f"sdt {name}", recording_id=identity, send_properties=False)
-    stream.save(path, default_blueprint=blueprint(_content(source, story)))
-    try:
-        stream.send_recording_name(source.stem)
-        draw_story(stream, story)
-        counts = _draw_scans(stream, source, story, every), _draw_images(stream, source, story)
-    finally:
-        stream.disconnect()
-    _check_whole(path)
-    return counts
-
-
-def _check_whole(path: Path) -> None:
-    """What fails while a file is written goes to Rerun's own log; a file that is whole ends with a manifest."""
-    try:
-        with warnings.catch_warnings(action="error"):
-            RrdReader(path).store()
-    except (RuntimeError, ValueError, OSError, Warning) as error:
-        free_mb = shutil.disk_usage(path.parent).free / 1e6
-        raise RunError(
-            f"{path.parent}: the .rrd could not be written whole ({free_mb:,.0f} MB free); make room, or show fewer scans "
-            "with --every"
-        ) from error
+    layout = blueprint(_content(source, story))
+    with RrdFile(path, f"sdt {name}", f"{source.recording_id}/{name}", layout) as file:
+        file.stream.send_recording_name(source.stem)
+        draw_story(file.stream, story)
+        return _draw_scans(file.stream, source, story, every), _draw_images(file.stream, source, story)
 
 
 def _content(source: Recording, story: Story) -> Content:

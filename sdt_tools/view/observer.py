@@ -11,6 +11,7 @@ from jaxtyping import Float64
 
 from sdt_tools.clock import SECOND_NS
 from sdt_tools.config import MotionConfig
+from sdt_tools.errors import OutputExistsError
 from sdt_tools.frames import (
     CameraImage,
     FrameTransform,
@@ -30,6 +31,7 @@ from sdt_tools.view.geometry import codes, front_range_m, lidar_poses, seen_from
 from sdt_tools.view.lanes import style_lane
 from sdt_tools.view.notes import USUAL_MOUNT, USUAL_WIDTH_PX, is_lidar_mount, mount_of
 from sdt_tools.view.people import send_operator, style_operator
+from sdt_tools.view.rrd_file import RrdFile
 from sdt_tools.view.scan_view import BOLD, draw_furniture, send_motions, send_scans, style_motion, style_scans
 from sdt_tools.view.series import send_scalars, style_sensor_series
 from sdt_tools.view.timeline import When, send
@@ -42,6 +44,7 @@ LIVE_PERIOD_NS: Final = SECOND_NS // 25 - SECOND_NS // 1000
 """Scans and poses are drawn 25 times a second at most; a millisecond is for their jitter."""
 
 CLOSE_S: Final = 10.0
+LIVE: Final = "sdt live"
 COMMAND: Final = "command"
 
 
@@ -50,6 +53,7 @@ class RerunObserver:
 
     def __init__(self, stream: rr.RecordingStream, motions: MotionConfig | None = None) -> None:
         self._stream = stream
+        self._file: RrdFile | None = None
         self._motions = motions or MotionConfig()
         self._mount = USUAL_MOUNT
         self._frame = 0
@@ -67,16 +71,19 @@ class RerunObserver:
     @classmethod
     def to_viewer(cls, url: str, motions: MotionConfig | None = None) -> "RerunObserver":
         """A viewer that runs already, as at ``rerun+http://127.0.0.1:9876/proxy``."""
-        stream = _stream()
+        stream = rr.RecordingStream(LIVE, recording_id=_live_id(), send_properties=False)
         stream.connect_grpc(url, default_blueprint=blueprint(LIVE_CONTENT))
         return cls(stream, motions)
 
     @classmethod
     def to_file(cls, path: Path, motions: MotionConfig | None = None) -> "RerunObserver":
-        """An .rrd that grows with the session."""
-        stream = _stream()
-        stream.save(path, default_blueprint=blueprint(LIVE_CONTENT))
-        return cls(stream, motions)
+        """An .rrd that grows with the session. Raises OutputExistsError."""
+        if path.exists():
+            raise OutputExistsError(path)
+        file = RrdFile(path, LIVE, _live_id(), blueprint(LIVE_CONTENT))
+        observer = cls(file.stream, motions)
+        observer._file = file
+        return observer
 
     def observe(self, received: Received) -> None:
         """Draw one message."""
@@ -103,7 +110,13 @@ class RerunObserver:
                 pass
 
     def close(self) -> None:
-        """Send what is left and let go of the viewer or file; may be called twice."""
+        """Send what is left and let go of the viewer or file; may be called twice.
+
+        Raises RunError where a file could not be written whole.
+        """
+        if self._file is not None:
+            self._file.close()
+            return
         with suppress(RuntimeError):  # someone closed the viewer: a session does not depend on it
             self._stream.flush(timeout_sec=CLOSE_S)
         self._stream.disconnect()
@@ -169,8 +182,8 @@ class RerunObserver:
         return When(np.array([stamp_ns], np.int64), np.array([self._frame], np.int64))
 
 
-def _stream() -> rr.RecordingStream:
-    return rr.RecordingStream("sdt live", recording_id=f"live {time.time_ns()}", send_properties=False)
+def _live_id() -> str:
+    return f"live {time.time_ns()}"
 
 
 def _row(pose: Pose2D) -> Float64[np.ndarray, "1 3"]:

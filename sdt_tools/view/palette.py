@@ -16,7 +16,7 @@ QUIET: Final[Rgb] = (120, 128, 142)
 WALLS: Final[Rgb] = (88, 98, 116)
 ROBOT: Final[Rgb] = (225, 230, 238)
 ZONE: Final[Rgb] = (255, 82, 82)
-OPERATOR: Final[Rgb] = (255, 171, 64)
+OPERATOR: Final[Rgb] = (228, 190, 140)
 LABEL: Final[Rgb] = (245, 245, 245)
 CODE: Final[Rgb] = (96, 102, 112)
 """Rays on which the sensor gave a code in place of a distance."""

@@ -3,15 +3,21 @@ import numpy as np
 from sdt_tools.control.policy import PolicyDriver
 from sdt_tools.frames import RAYS, LidarScan, MotionClass
 from sdt_tools.models.card import ModelCard
-from sdt_tools.models.follow_net import FollowNetConfig, new_follow_net
+from sdt_tools.models.follow_net import FollowNet, FollowNetConfig, new_follow_net
 from sdt_tools.models.loaded import LoadedModel
 from sdt_tools.models.preprocess import PreprocessConfig
 from sdt_tools.protocols import Driver, Observation
 
 
 def driver() -> PolicyDriver:
-    network = new_follow_net(FollowNetConfig(), PreprocessConfig(), 3)
-    return PolicyDriver(LoadedModel("tried", network, ModelCard.of(network, 3)))
+    network = new_follow_net(FollowNetConfig(), PreprocessConfig(), 3).eval()
+    return PolicyDriver(
+        LoadedModel(
+            "tried",
+            network,
+            ModelCard(kind=FollowNet.kind, seed=3, architecture=network.architecture, preprocess=network.preprocess),
+        )
+    )
 
 
 def test_it_is_a_driver_called_after_its_network() -> None:

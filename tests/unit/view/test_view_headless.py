@@ -7,6 +7,7 @@ from pathlib import Path
 
 import cv2
 import numpy as np
+import psutil
 import pytest
 from conftest import Viewed
 from rerun.experimental import ViewerClient
@@ -15,8 +16,8 @@ from view_samples import MAGENTA_BGR, scan_ns
 from sdt_tools.view import viewer as viewer_module
 from sdt_tools.view.observer import RerunObserver
 from sdt_tools.view.palette import LABEL, OPERATOR, STATUSES, ZONE, Rgb
-from sdt_tools.view.screenshot import show
-from sdt_tools.view.viewer import ViewerError, headless_viewer, viewer_url
+from sdt_tools.view.screenshot import screenshot, show
+from sdt_tools.view.viewer import ViewerError, headless_viewer
 
 Screen = Callable[[str], np.ndarray]
 
@@ -128,9 +129,22 @@ def test_a_session_is_seen_live(viewer: ViewerClient, viewed: Viewed, screen: Sc
     assert len(where(screen("Camera"), MAGENTA_BGR[::-1])) > 1000
 
 
-def test_the_viewer_listens_on_loopback_and_is_gone_afterwards() -> None:
-    port = viewer_module.free_port()
-    assert viewer_url(port) == f"rerun+http://127.0.0.1:{port}/proxy"
+def test_a_screenshot_of_the_whole_viewer_has_the_size_asked_for(
+    viewer: ViewerClient, viewed: Viewed, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("sdt_tools.view.screenshot.NOTICES_S", 0.0)
+    screenshot(viewed.rrd, tmp_path / "whole.png", scan_ns(20), width=900, height=600)
+    image = np.asarray(cv2.imread(str(tmp_path / "whole.png")))
+    assert image.shape == (600, 900, 3)
+    assert len(where(image, STATUSES["correct"])) > 50
+
+
+def test_the_viewer_listens_on_loopback_and_is_gone_afterwards(viewer: ViewerClient) -> None:
+    with headless_viewer(400, 300) as other:
+        port = int(other.url.removeprefix("rerun+http://127.0.0.1:").removesuffix("/proxy"))
+        listening = [c.laddr.ip for c in psutil.net_connections("tcp") if c.laddr.port == port and c.status == "LISTEN"]
+        assert listening == ["127.0.0.1"]
+    assert not [c for c in psutil.net_connections("tcp") if c.laddr.port == port and c.status == "LISTEN"]
 
 
 def test_the_viewer_sends_no_usage_data(tmp_path: Path) -> None:

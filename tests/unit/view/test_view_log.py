@@ -22,7 +22,9 @@ from view_samples import (
 )
 
 from sdt_tools.errors import OutputExistsError, RecordingError, UsageError
-from sdt_tools.frames import LIDAR_AHEAD_M
+from sdt_tools.frames import LIDAR_AHEAD_M, CameraImage, Received
+from sdt_tools.protocols import SourceInfo
+from sdt_tools.recording.writer import RecordingWriter
 from sdt_tools.view.log import write_rrd
 from sdt_tools.view.palette import STATUSES, packed
 
@@ -137,6 +139,14 @@ def test_a_recording_without_camera_truth_or_predictions_is_drawn_as_far_as_it_g
     assert (bare.summary.images, bare.summary.models) == (0, ())
 
 
+def test_images_alone_are_shown_too(tmp_path: Path) -> None:
+    with RecordingWriter(tmp_path / "film.mcap", SourceInfo("robot"), "") as writer:
+        writer.write(Received(START_NS, CameraImage(START_NS, jpeg())))
+    summary = write_rrd(tmp_path / "film.mcap", tmp_path / "film.rrd")
+    assert (summary.scans, summary.images) == (0, 1)
+    assert [row[:2] for row in rows(tmp_path / "film.rrd", "camera/image", "EncodedImage:blob")] == [(START_NS, 0)]
+
+
 def test_the_layout_is_inside(viewed: Viewed) -> None:
     reader = RrdReader(viewed.rrd)
     (store,) = reader.recordings()
@@ -195,10 +205,16 @@ def test_a_full_disk_is_no_success(viewed: Viewed, tmp_path: Path) -> None:
         "write_rrd(Path(sys.argv[1]), Path(sys.argv[2]))"
     )
     command = [sys.executable, "-c", code, str(viewed.recording), str(tmp_path / "full.rrd")]
-    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    done = subprocess.run(command, capture_output=True, text=True, check=False, timeout=60)
     assert done.stderr.splitlines()[-1].startswith("sdt_tools.errors.RunError")
-    assert "could not be written whole" in done.stderr.splitlines()[-1]
+    assert "the disk does not take it (File too large)" in done.stderr.splitlines()[-1]
     assert list(tmp_path.iterdir()) == []
+
+
+def test_what_a_killed_run_left_is_no_obstacle(viewed: Viewed, tmp_path: Path) -> None:
+    (tmp_path / ".room.rrd.partial").write_text("left behind")
+    write_rrd(viewed.recording, tmp_path / "room.rrd", every=50)
+    assert [path.name for path in tmp_path.iterdir()] == ["room.rrd"]
 
 
 def test_a_failure_half_way_leaves_no_partial_file(

@@ -5,6 +5,7 @@ import pytest
 from conftest import Viewed
 from view_samples import SCANS, START_NS, messages, rows, scan_ns
 
+from sdt_tools.errors import OutputExistsError
 from sdt_tools.protocols import Observer
 from sdt_tools.view.observer import RerunObserver
 
@@ -46,6 +47,13 @@ def test_what_is_drawn_live_is_what_is_drawn_later(live: Path, viewed: Viewed, e
     for stamp, frame, value in shown:
         assert later[stamp][0] == frame
         assert same(later[stamp][1], value)
+
+
+def test_an_existing_file_is_left_alone(live: Path) -> None:
+    before = live.read_bytes()
+    with pytest.raises(OutputExistsError):
+        RerunObserver.to_file(live)
+    assert live.read_bytes() == before
 
 
 def test_scans_are_drawn_25_times_a_second(live: Path) -> None:

@@ -1,0 +1,122 @@
+"""Every wrong input: one line that says what, where and what to do; exit 2; nothing harmed."""
+
+import sys
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from sdt_tools.cli.app import main
+from sdt_tools.models.card import ModelCard
+from sdt_tools.models.checkpoint import save_checkpoint
+from sdt_tools.models.follow_net import FollowNet, FollowNetConfig, new_follow_net
+from sdt_tools.models.preprocess import PreprocessConfig
+
+SAMPLES = Path(__file__).parents[2] / "recordings"
+Sdt = Callable[..., tuple[int, str]]
+
+
+@pytest.fixture
+def sdt(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> Callable[..., tuple[int, str]]:
+    """Runs a command in an empty folder; returns the exit code and what it said on stderr."""
+
+    def call(*words: object) -> tuple[int, str]:
+        monkeypatch.chdir(tmp_path)
+        monkeypatch.setattr(sys, "argv", ["sdt", *map(str, words)])
+        with pytest.raises(SystemExit) as stop:
+            main()
+        return int(stop.value.code or 0), capsys.readouterr().err
+
+    return call
+
+
+@pytest.fixture
+def model(tmp_path: Path) -> Path:
+    network = new_follow_net(FollowNetConfig(), PreprocessConfig(), 0)
+    save_checkpoint(
+        tmp_path / "model",
+        network,
+        ModelCard(kind=FollowNet.kind, seed=0, architecture=network.architecture, preprocess=network.preprocess),
+    )
+    return tmp_path / "model"
+
+
+def assert_refused(result: tuple[int, str], *words: str) -> None:
+    code, said = result
+    assert code == 2
+    assert said.startswith("sdt: ")
+    assert said.count("\n") == 1
+    for word in words:
+        assert word in said
+
+
+@pytest.mark.parametrize(
+    "command",
+    [
+        ["inspect", "none.mcap"],
+        ["label", "auto", "none.mcap", "--from", "truth"],
+        ["dataset", "build", "none.mcap", "--out", "data"],
+        ["view", "none.mcap"],
+    ],
+)
+def test_a_missing_recording_is_named(sdt: Sdt, command: list[str]) -> None:
+    assert_refused(sdt(*command), "none.mcap", "no such")
+
+
+def test_a_file_that_is_not_an_mcap_is_named(sdt: Sdt, tmp_path: Path) -> None:
+    (tmp_path / "notes.mcap").write_text("This is no recording, however long it may go on. " * 9)
+    assert_refused(sdt("inspect", "notes.mcap"), "notes.mcap", "not an MCAP")
+
+
+def test_an_unknown_scenario_lists_the_known_ones(sdt: Sdt, tmp_path: Path) -> None:
+    assert_refused(sdt("record", "scene", "--scenario", "plane", "--out", "x.mcap"), "plane", "plain", "around_boxes")
+    assert not (tmp_path / "x.mcap").exists()
+
+
+def test_an_unknown_key_names_the_nearest(sdt: Sdt, tmp_path: Path) -> None:
+    (tmp_path / "c.toml").write_text("[rates]\nscan_hertz = 25.0\n")
+    result = sdt("record", "scene", "--config", "c.toml", "--out", "x.mcap")
+    assert_refused(result, "c.toml", "unknown key", "rates.scan_hertz", "did you mean 'scan_hz'")
+
+
+def test_an_output_that_exists_is_left_alone(sdt: Sdt, tmp_path: Path) -> None:
+    (tmp_path / "x.mcap").write_text("mine")
+    assert_refused(sdt("record", "scene", "--no-camera", "--seconds", 1, "--out", "x.mcap"), "x.mcap exists already")
+    assert (tmp_path / "x.mcap").read_text() == "mine"
+
+
+def test_another_number_of_rays_is_said(sdt: Sdt, tmp_path: Path) -> None:
+    (tmp_path / "short.csv").write_text("\n".join(",".join(["1.0"] * 364) for _ in range(3)))
+    assert_refused(sdt("import", "lidar-csv", "short.csv", "--hz", 25, "--out", "x.mcap"), "short.csv", "541")
+
+
+def test_a_checkpoint_of_another_architecture_is_refused(sdt: Sdt, model: Path) -> None:
+    card = model / "model.toml"
+    card.write_text(card.read_text().replace("hidden = 48", "hidden = 64"))
+    result = sdt("replay", model, SAMPLES / "sample_practice.mcap", "--out", "p.parquet")
+    assert_refused(result, "model")
+
+
+def test_a_folder_without_a_model_is_refused(sdt: Sdt, tmp_path: Path) -> None:
+    assert_refused(sdt("evaluate", "follow", tmp_path, "--scenario", "plain", "--seeds", "0"), str(tmp_path))
+
+
+def test_an_empty_data_set_is_refused(sdt: Sdt, tmp_path: Path) -> None:
+    (tmp_path / "data").mkdir()
+    assert_refused(sdt("train", "follow", "data", "--out", "m"), "data")
+
+
+def test_recordings_without_labels_make_no_data_set(sdt: Sdt, tmp_path: Path) -> None:
+    result = sdt("dataset", "build", SAMPLES / "sample_practice.mcap", "--labels", tmp_path, "--out", "data")
+    assert_refused(result, "sample_practice", "label")
+    assert not (tmp_path / "data").exists()
+
+
+def test_errors_without_labels_say_what_to_do(sdt: Sdt, model: Path, tmp_path: Path) -> None:
+    recording = SAMPLES / "sample_practice.mcap"
+    assert sdt("replay", model, recording, "--out", "p.parquet")[0] == 0
+    result = sdt("errors", "p.parquet", "--recordings", recording, "--out", "e")
+    assert_refused(result, "label")
+    assert not (tmp_path / "e").exists()
