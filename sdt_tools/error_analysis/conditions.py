@@ -74,7 +74,7 @@ def _nothing_to_confirm(frames: LabelledFrames, options: ErrorOptions) -> str:
     needed = options.conditions.min_recordings_total
     if frames.recordings < needed:
         return (
-            f"{frames.recordings} recordings: no condition can be confirmed with fewer than {needed}, "
+            f"recordings: {frames.recordings}; no condition can be confirmed with fewer than {needed}, "
             "since those that it is found on cannot confirm it"
         )
     if not frames.wrong.any():

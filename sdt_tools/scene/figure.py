@@ -13,7 +13,7 @@ from matplotlib.patches import Circle, Polygon
 from sdt_tools.frames import ROBOT_LENGTH_M, ROBOT_WIDTH_M, Pose2D
 from sdt_tools.scene.layout import Box, Layout
 
-Path2D = Float64[np.ndarray, "steps 3"]
+Path2D = Float64[np.ndarray, "_ 3"]
 
 
 def layout_figure(layouts: Layout | Sequence[Layout], paths: Sequence[Path2D], out: Path) -> None:

@@ -1,11 +1,11 @@
-"""Rooms to practise in: open, cluttered, with a corridor, a gate, a corner, tables."""
+"""Rooms to practise in: open, cluttered, with boxes along a way, a corridor, a gate, a corner, tables."""
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
-from jaxtyping import Float64
 
 from sdt_tools.scene.layout import Box, Post, Wall
 
@@ -26,10 +26,10 @@ class Room:
 
 
 def draw_room(rng: np.random.Generator) -> Room:
-    """A room of one of six kinds, a third of them with some boxes more."""
+    """A room of one of seven kinds, a third of them with some boxes more."""
     width_m, depth_m = rng.uniform(5.0, 13.0, 2).tolist()
-    kinds = (_open, _cluttered, _corridor, _gate, _corner, _tables)
-    kind = kinds[rng.choice(len(kinds), p=(0.2, 0.26, 0.18, 0.14, 0.1, 0.12))]
+    kinds = (_open, _cluttered, _lined, _corridor, _gate, _corner, _tables)
+    kind = kinds[rng.choice(len(kinds), p=(0.18, 0.14, 0.18, 0.16, 0.13, 0.1, 0.11))]
     size_m = (width_m, depth_m)
     room = kind(rng, size_m, _around(width_m, depth_m))
     inner = tuple(part for wall in room.walls for part in _within(wall, size_m))
@@ -70,6 +70,21 @@ def _open(_rng: np.random.Generator, size_m: Point, walls: tuple[Wall, ...]) -> 
 
 def _cluttered(rng: np.random.Generator, size_m: Point, walls: tuple[Wall, ...]) -> Room:
     return _with_boxes(rng, Room(size_m, walls), int(rng.integers(4, 11)))
+
+
+def _lined(rng: np.random.Generator, size_m: Point, walls: tuple[Wall, ...]) -> Room:
+    """A bent way with boxes close beside it."""
+    place = _placement(rng)
+    way = [(-2.5, rng.uniform(-0.6, 0.6)), (0.0, rng.uniform(-0.6, 0.6)), (2.5, rng.uniform(-0.6, 0.6))]
+    boxes = []
+    for _ in range(int(rng.integers(2, 7))):
+        length, width, yaw = rng.uniform(0.2, 0.9), rng.uniform(0.2, 0.9), rng.uniform(0, math.pi)
+        x = rng.uniform(-2.5, 2.5)
+        beside = float(np.interp(x, [point[0] for point in way], [point[1] for point in way]))
+        aside = rng.choice([-1.0, 1.0]) * (rng.uniform(0.3, 0.8) + math.hypot(length, width) / 2)
+        (centre,) = place([(x, beside + aside)])
+        boxes.append(Box(*centre, length, width, yaw, rng.uniform(0.4, 1.2)))
+    return Room(size_m, walls, tuple(boxes), lines=(tuple(place(way)),))
 
 
 def _corridor(rng: np.random.Generator, size_m: Point, walls: tuple[Wall, ...]) -> Room:
@@ -130,15 +145,13 @@ def _with_boxes(rng: np.random.Generator, room: Room, count: int) -> Room:
     return replace(room, boxes=tuple(boxes))
 
 
-class _placement:  # noqa: N801 - used as a function
-    """A random turn and shift for the points of one element."""
+def _placement(rng: np.random.Generator, reach_m: float = 1.0) -> Callable[[list[Point]], list[Point]]:
+    """A random turn and shift, for all points of one element."""
+    yaw = rng.uniform(0, 2 * math.pi)
+    c, s = math.cos(yaw), math.sin(yaw)
+    turn, shift_m = np.array([[c, s], [-s, c]]), rng.uniform(-reach_m, reach_m, 2)
 
-    def __init__(self, rng: np.random.Generator, reach_m: float = 1.0) -> None:
-        yaw = rng.uniform(0, 2 * math.pi)
-        c, s = math.cos(yaw), math.sin(yaw)
-        self._turn: Float64[np.ndarray, "2 2"] = np.array([[c, s], [-s, c]])
-        self._shift: Float64[np.ndarray, "2"] = rng.uniform(-reach_m, reach_m, 2)
+    def place(points: list[Point]) -> list[Point]:
+        return [(x, y) for x, y in (np.array(points) @ turn + shift_m).tolist()]
 
-    def __call__(self, points: list[Point]) -> list[Point]:
-        moved = np.array(points) @ self._turn + self._shift
-        return [(x, y) for x, y in moved.tolist()]
+    return place

@@ -10,7 +10,10 @@ from replay_samples import NearestAhead, label, write_drive
 from sdt_tools.cli import app
 from sdt_tools.error_analysis.analyse import analyse_errors
 from sdt_tools.error_analysis.definitions import ErrorOptions, Tag
-from sdt_tools.error_analysis.report import ErrorReport
+from sdt_tools.error_analysis.explain import explain
+from sdt_tools.error_analysis.labelled import load_labelled
+from sdt_tools.error_analysis.recorded import find_recordings, read_situations
+from sdt_tools.error_analysis.report import ErrorReport, summarise
 from sdt_tools.errors import ConfigError, OutputExistsError, RecordingError, UsageError
 from sdt_tools.replay.replay import replay
 
@@ -46,6 +49,13 @@ def altered(material: Material, tmp_path: Path, **changes: pl.Expr) -> Path:
     return path
 
 
+def report_of(predictions: Path, material: Material, options: ErrorOptions = OPTIONS) -> ErrorReport:
+    """The analysis without its files."""
+    frames = load_labelled(predictions, options)
+    scans = read_situations(frames, find_recordings(frames, [material.recordings]), options)
+    return summarise(frames, explain(frames, scans, options), options)
+
+
 @pytest.fixture(scope="module")
 def analysed(material: Material, tmp_path_factory: pytest.TempPathFactory) -> tuple[ErrorReport, Path]:
     out = tmp_path_factory.mktemp("analysis") / "errors"
@@ -76,9 +86,9 @@ def test_the_folder_holds_tags_report_and_figures(analysed: tuple[ErrorReport, P
     assert tags.select("recording", "stamp_ns", "label").equals(keys.select("recording", "stamp_ns", "label"))
 
 
-def test_cross_entropy_gives_the_same_errors_under_a_fitting_eta(material: Material, tmp_path: Path) -> None:
+def test_cross_entropy_gives_the_same_errors_under_a_fitting_eta(material: Material) -> None:
     options = ErrorOptions(loss="cross_entropy", eta=1.5)
-    report = analyse_errors(material.predictions, [material.recordings], options, tmp_path / "errors")
+    report = report_of(material.predictions, material, options)
     assert [condition.verdict.condition.text for condition in report.conditions] == ["front_range_m < 1"]
 
 
@@ -86,9 +96,9 @@ def test_one_recording_is_analysed_without_conditions(material: Material, tmp_pa
     drive = material.recordings / "drive_0.mcap"
     predictions = tmp_path / "one.parquet"
     replay(NearestAhead(stops_at_m=0.0), [drive], material.labels, predictions)
-    report = analyse_errors(predictions, [drive], OPTIONS, tmp_path / "errors")
+    report = report_of(predictions, material)
     assert report.conditions == ()
-    assert report.note.startswith("1 recordings: no condition can be confirmed with fewer than 8")
+    assert report.note.startswith("recordings: 1; no condition can be confirmed with fewer than 8")
 
 
 def test_a_model_without_errors_is_all_correct(material: Material, tmp_path: Path) -> None:
@@ -100,13 +110,12 @@ def test_a_model_without_errors_is_all_correct(material: Material, tmp_path: Pat
 
 def test_a_model_without_right_answers_is_systematically_wrong(material: Material, tmp_path: Path) -> None:
     predictions = altered(material, tmp_path, loss_01=pl.col("loss_01") * 0 + 1)
-    report = analyse_errors(predictions, [material.recordings], OPTIONS, tmp_path / "errors")
+    report = report_of(predictions, material)
     assert report.document()["tags"]["systematic"] == 200
 
 
-def test_an_epsilon_that_leaves_no_neighbours_is_warned_of(material: Material, tmp_path: Path) -> None:
-    options = ErrorOptions(epsilon_m=1e-6)
-    report = analyse_errors(material.predictions, [material.recordings], options, tmp_path / "errors")
+def test_an_epsilon_that_leaves_no_neighbours_is_warned_of(material: Material) -> None:
+    report = report_of(material.predictions, material, ErrorOptions(epsilon_m=1e-6))
     assert any("no error frame has a neighbour" in warning for warning in report.warnings)
 
 

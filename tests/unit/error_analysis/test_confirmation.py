@@ -85,3 +85,14 @@ def test_bursts_that_the_condition_only_meets_are_not_confirmed() -> None:
     verdict = judged(inside, wrong & (np.arange(600) % 10 > 0), length=100)
     assert verdict.p_adjusted is not None
     assert verdict.p_adjusted > OPTIONS.alpha
+
+
+def test_a_p_value_above_alpha_is_not_enough() -> None:
+    rng = np.random.default_rng(1)
+    inside = rng.random(1000) < 0.2
+    wrong = rng.random(1000) < np.where(inside, 0.8, 0.02)
+    strict = ConditionOptions(alpha=0.0005)  # fewer than one in a thousand, the least that 999 permutations can tell
+    recordings = recordings_of(wrong.astype(float), 50)
+    (verdict,) = confirm([CONDITION], [inside], recordings, 0.5, strict, np.random.default_rng(0))
+    assert verdict.p_adjusted == pytest.approx(0.001)
+    assert verdict.reason == "errors gather there by chance as often"

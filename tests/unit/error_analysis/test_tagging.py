@@ -133,7 +133,7 @@ def test_with_few_recordings_nothing_is_confirmed_and_that_is_said() -> None:
 @pytest.mark.parametrize("kind", ["alike", "correlated", "in bad recordings"])
 def test_errors_without_a_cause_seldom_yield_a_condition(kind: str) -> None:
     found = 0
-    for seed in range(6):
+    for seed in range(3):
         rng = np.random.default_rng(100 + seed)
         rows = table(rng, 24, 80)
         if kind == "alike":
@@ -143,7 +143,7 @@ def test_errors_without_a_cause_seldom_yield_a_condition(kind: str) -> None:
         else:
             wrong = rng.random(len(rows)) < np.repeat(np.where(rng.random(24) < 0.25, 0.85, 0.03), 80)
         found += bool(find_conditions(with_errors(rows, wrong), OPTIONS).confirmed)
-    assert found <= 1
+    assert found == 0
 
 
 def test_the_same_seed_gives_the_same_conditions() -> None:

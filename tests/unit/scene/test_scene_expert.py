@@ -6,9 +6,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from sdt_tools.config import MotionConfig
 from sdt_tools.frames import FORWARD_CLASSES, RAYS, MotionClass, Pose2D
+from sdt_tools.scene.config import SceneConfig
 from sdt_tools.scene.expert import SceneExpert, polar_rule
-from sdt_tools.scene.layout import Box, Layout, OperatorPlan, Wall
+from sdt_tools.scene.layout import Box, Layout, OperatorPlan, Post, Wall
 from sdt_tools.scene.raycast import cast_rays
 from sdt_tools.scene.scenario import layout_for
 from sdt_tools.scene.world import World
@@ -16,12 +18,12 @@ from sdt_tools.scene.world import World
 M = MotionClass
 
 
-def standing(range_m: float, bearing_deg: float, **things: object) -> World:
+def standing(range_m: float, bearing_deg: float, config: SceneConfig | None = None, **things: object) -> World:
     """The operator at this place of the LiDAR's polar coordinates."""
     bearing = math.radians(bearing_deg)
     x, y = 0.197 + range_m * math.cos(bearing), range_m * math.sin(bearing)
     plan = OperatorPlan(((x, y),), (0.0,), 0.5, 2.0, 0.4, 1.0, bearing + math.pi, 0.06, 0.26, 0.4, 0.0)
-    return World(replace(Layout("test", 0, 60.0, Pose2D(0.0, 0.0, 0.0), plan), **things))
+    return World(replace(Layout("test", 0, 60.0, Pose2D(0.0, 0.0, 0.0), plan), **things), config)
 
 
 @pytest.mark.parametrize(
@@ -48,6 +50,14 @@ def test_a_box_in_the_way_is_not_driven_into() -> None:
 
     assert free is M.FORWARD
     assert blocked is not M.FORWARD
+
+
+def test_however_slow_it_drives_nothing_within_the_safety_domains_is_approached() -> None:
+    crawling = SceneConfig(motions=MotionConfig(forward_mps=0.05, turning_forward_mps=0.05))
+    post_m = (Post(0.197 + 0.25, 0.0, 0.03),)  # 0.22 m ahead of the LiDAR
+
+    assert SceneExpert(standing(2.0, 0.0, crawling)).advise() is M.FORWARD
+    assert SceneExpert(standing(2.0, 0.0, crawling, posts=post_m)).advise() not in FORWARD_CLASSES
 
 
 def test_a_wall_behind_keeps_it_from_backing_off() -> None:

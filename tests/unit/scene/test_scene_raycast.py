@@ -50,6 +50,16 @@ def test_a_circle_ahead() -> None:
     assert (ranges[~hit] == MAX_RANGE_M).all()
 
 
+def test_a_wide_circle_behind_is_seen_at_both_ends_of_the_scan() -> None:
+    for y in (0.02, -0.02):
+        ranges = cast(NO_SEGMENTS, np.array([[-1.0, y, 0.95]]))
+
+        angles = ray_angles_rad()[[0, RAYS - 1]]
+        along, across = -np.cos(angles) + y * np.sin(angles), -np.sin(angles) - y * np.cos(angles)
+        np.testing.assert_allclose(ranges[[0, RAYS - 1]], along - np.sqrt(0.95**2 - across**2), atol=1e-9)
+        assert ranges[RAYS // 2] == MAX_RANGE_M
+
+
 def test_from_within_a_circle_every_ray_measures_nothing() -> None:
     assert (cast(NO_SEGMENTS, np.array([[0.1, 0.0, 0.5]])) == 0.0).all()
 

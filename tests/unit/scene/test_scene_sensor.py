@@ -106,11 +106,14 @@ def test_the_truth_is_left_alone() -> None:
 
 
 def test_codes_come_in_episodes_at_any_scan_rate() -> None:
-    """A coded ray stays coded 0.1 s later, whether the sensor scans 10 or 50 times a second."""
+    """A coded ray stays coded 0.1 s later and the share 1 s later, at 10 and at 50 scans a second."""
     for scan_hz, lag in ((10.0, 1), (50.0, 5)):
         codes = [coded(scans(sensor(seed, scan_hz=scan_hz), round(20 * scan_hz))) for seed in range(10)]
         again = sum((code[lag:] & code[:-lag]).sum() for code in codes) / sum(code[:-lag].sum() for code in codes)
         assert 0.7 < again < 0.92
+        shares, second = [coded_share(np.where(code, 0.0, 1.0)) for code in codes], round(scan_hz)
+        now, later = (np.concatenate(part) for part in zip(*((s[:-second], s[second:]) for s in shares), strict=True))
+        assert np.corrcoef(now, later)[0, 1] > 0.7
 
 
 def real_drives() -> list[np.ndarray]:

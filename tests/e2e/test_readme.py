@@ -1,0 +1,80 @@
+"""README is true: its commands run, small, and it names every verb."""
+
+import gzip
+import os
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from typer.main import get_command
+
+from sdt_tools.cli.app import app
+from sdt_tools.frames import RAYS
+from sdt_tools.models.card import ModelCard
+from sdt_tools.models.checkpoint import save_checkpoint
+from sdt_tools.models.follow_net import FollowNet, FollowNetConfig, new_follow_net
+from sdt_tools.models.preprocess import PreprocessConfig
+
+ROOT = Path(__file__).parents[2]
+README = (ROOT / "README.md").read_text(encoding="utf-8")
+SMALLER = {
+    "--seconds 20": "--seconds 2",
+    "seq 0 39": "seq 0 9",
+    "--out analysis/practice\n": "--out analysis/practice --val-share 0.5\n",
+    "--out analysis/my_follow": "--out analysis/my_follow --epochs 1",
+    "--seeds 1000-1019": "--seeds 1000-1001",
+}
+
+
+def blocks() -> list[str]:
+    found = re.findall(r"```sh\n(.*?)```", README, re.DOTALL)
+    return [block for block in found if "sdt " in block]
+
+
+@pytest.fixture(scope="module")
+def workplace(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder as README finds it: the demo's network and a drive in CSV are there."""
+    folder = tmp_path_factory.mktemp("readme")
+    network = new_follow_net(FollowNetConfig(), PreprocessConfig(), 0)
+    card = ModelCard(kind=FollowNet.kind, seed=0, architecture=network.architecture, preprocess=network.preprocess)
+    save_checkpoint(folder / "analysis/demo/model/follow-0", network, card)
+    rows = np.hstack([np.arange(5)[:, None], np.zeros((5, 2)), np.full((5, RAYS), 2.5), np.zeros((5, 1))])
+    with gzip.open(folder / "drive.csv.gz", "wt") as stream:
+        np.savetxt(stream, rows, fmt="%g", delimiter=",")
+    return folder
+
+
+@pytest.mark.parametrize("number", range(len(blocks())))
+def test_the_commands_run_in_the_order_they_are_given(workplace: Path, number: int) -> None:
+    script = blocks()[number]
+    for said, small in SMALLER.items():
+        script = script.replace(said, small)
+    path = f"{Path(sys.executable).parent}:{os.environ['PATH']}"
+    call = ["bash", "-euo", "pipefail", "-c", script]
+    done = subprocess.run(call, cwd=workplace, env={**os.environ, "PATH": path}, capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+
+
+def test_what_is_made_smaller_is_in_the_readme() -> None:
+    text = "".join(blocks())
+    assert [said for said in SMALLER if said not in text] == []
+
+
+def test_every_verb_is_in_the_table() -> None:
+    named = set(re.findall(r"^\| `sdt ([a-z -]+)`", README, re.MULTILINE))
+    root = get_command(app)
+    commands = {
+        " ".join([verb, *rest])
+        for verb, command in root.commands.items()  # type: ignore[attr-defined]
+        for rest in ([[name] for name in getattr(command, "commands", {})] or [[]])
+    }
+    assert named == commands
+
+
+def test_links_to_files_lead_somewhere() -> None:
+    targets = re.findall(r"\]\(((?!https?:)[^)]+)\)", README)
+    assert targets
+    assert [target for target in targets if not (ROOT / target).exists()] == []
