@@ -12,6 +12,7 @@ from typing import Any, TypeVar, get_args
 
 import tomli_w
 from pydantic import BaseModel, ConfigDict, ValidationError
+from pydantic.fields import FieldInfo
 
 from sdt_tools.errors import ConfigError
 from sdt_tools.frames import MotionClass, Twist
@@ -92,7 +93,8 @@ def dump_config(config: Config) -> str:
 
 
 def _explain(model: type[Config], error: ValidationError) -> str:
-    first = error.errors()[0]
+    unknown_keys = [one for one in error.errors() if one["type"] == "extra_forbidden"]
+    first = (unknown_keys or error.errors())[0]  # a misspelt key is also a missing one
     place = ".".join(str(part) for part in first["loc"])
     if first["type"] == "extra_forbidden":
         near = difflib.get_close_matches(str(first["loc"][-1]), _keys_at(model, first["loc"][:-1]), n=1, cutoff=0.0)
@@ -105,9 +107,14 @@ def _keys_at(model: type[BaseModel], place: tuple[int | str, ...]) -> list[str]:
     """Valid keys of the table at ``place``, list positions skipped."""
     tables = [model]
     for step in (part for part in place if isinstance(part, str)):
-        inner = [field.annotation for table in tables for name, field in table.model_fields.items() if name == step]
+        inner = [field.annotation for table in tables for key, field in _fields(table) if key == step]
         tables = [found for annotation in inner for found in _models_in(annotation)] or tables
-    return sorted({name for table in tables for name in table.model_fields})
+    return sorted({key for table in tables for key, _ in _fields(table)})
+
+
+def _fields(table: type[BaseModel]) -> list[tuple[str, FieldInfo]]:
+    """Fields by the keys that a file calls them."""
+    return [(field.alias or name, field) for name, field in table.model_fields.items()]
 
 
 def _models_in(annotation: object) -> Iterator[type[BaseModel]]:

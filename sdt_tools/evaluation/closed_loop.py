@@ -13,7 +13,7 @@ from sdt_tools.config import Config
 from sdt_tools.evaluation.outcome import Judge, Situation, SuccessConfig, Verdict
 from sdt_tools.evaluation.policies import Policy
 from sdt_tools.evaluation.results import RunResult, TracePoint
-from sdt_tools.frames import RAYS, LidarScan, MotionClass, MotionCommand, Pose2D, Twist
+from sdt_tools.frames import RAYS, LidarScan, MotionClass, MotionCommand, Twist
 from sdt_tools.scene.config import PHYSICS_HZ, SceneConfig
 from sdt_tools.scene.expert import SceneExpert
 from sdt_tools.scene.layout import Layout
@@ -102,7 +102,7 @@ def _start(layout: Layout, config: ClosedLoopConfig, recorder_for: RecorderFacto
         layout=layout,
         world=world,
         expert=SceneExpert(world),
-        sensor=SensorModel(config.scene.sensor, generator(layout.seed, Stream.SENSOR)),
+        sensor=SensorModel(config.scene.sensor, generator(layout.seed, Stream.SENSOR), config.scene.rates.scan_hz),
         judge=Judge(layout.timeout_s, config.success),
         recorder=recorder_for(layout) if recorder_for else None,
         trace=[],
@@ -146,21 +146,16 @@ def _decide(
 def _situation(run: _Run) -> Situation:
     world, lidar, operator = run.world, run.world.lidar_pose, run.world.operator
     dx_m, dy_m = operator.x_m - lidar.x_m, operator.y_m - lidar.y_m
-    before = run.trace[-1] if run.trace else None
     return Situation(
         time_s=world.time_s,
         robot=world.robot,
         operator_range_m=math.hypot(dx_m, dy_m),
         operator_bearing_rad=math.remainder(math.atan2(dy_m, dx_m) - lidar.yaw_rad, math.tau),
         operator_visible=world.operator_visible(),
-        operator_standing=before is not None and _same_place(before, operator),
+        operator_standing=world.operator_standing,
         operator_ended=world.operator_done,
         contact=world.contact,
     )
-
-
-def _same_place(before: TracePoint, operator: Pose2D) -> bool:
-    return math.hypot(operator.x_m - before.operator_x_m, operator.y_m - before.operator_y_m) < 1e-3
 
 
 def _trace_point(world: World, now: Situation, front_range_m: float, motion: MotionClass) -> TracePoint:

@@ -9,10 +9,9 @@ from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
-from matplotlib.patches import Circle, Polygon
 
 from sdt_tools.evaluation.outcome import Outcome
-from sdt_tools.scene.layout import Layout
+from sdt_tools.scene.figure import draw_room
 from sdt_tools.scene.scenario import layout_for
 
 OUTCOME_COLOURS: Final = {
@@ -38,23 +37,12 @@ def runs_figure(runs: pl.DataFrame, traces: pl.DataFrame, scenario: str, title: 
     for panel in panels:
         panel.set_axis_off()
     for panel, run in zip(panels, runs.sort("seed").iter_rows(named=True), strict=False):
-        draw_layout(panel, layout_for(scenario, run["seed"]))
+        draw_room(panel, layout_for(scenario, run["seed"]))
         _draw_run(panel, traces.filter(pl.col("seed") == run["seed"]), run["outcome"])
         panel.set_title(f"{run['seed']}: {run['outcome']}, {run['simulated_s']:.0f} s", fontsize=8)
     figure.suptitle(title, fontsize=11)
     figure.legend(handles=_legend(set(runs["outcome"])), loc="outside lower center", ncols=6, fontsize=8, frameon=False)
     figure.savefig(out, dpi=90)
-
-
-def draw_layout(panel: Axes, layout: Layout) -> None:
-    """Walls, boxes and posts from above: x to the right, y up, metres."""
-    for wall in layout.walls:
-        panel.plot([wall.x0_m, wall.x1_m], [wall.y0_m, wall.y1_m], color="#343a40", linewidth=1.2)
-    for box in layout.boxes:
-        panel.add_patch(Polygon(box.corners(), facecolor="#ced4da", edgecolor="#343a40", linewidth=0.8))
-    for post in layout.posts:
-        panel.add_patch(Circle((post.x_m, post.y_m), post.radius_m, color="#343a40"))
-    panel.set_aspect("equal")
 
 
 def _draw_run(panel: Axes, trace: pl.DataFrame, outcome: str) -> None:

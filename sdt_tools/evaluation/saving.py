@@ -75,7 +75,7 @@ class MemoryRecorder:
         self._messages.append(LogEntry(end_ns, level, f"{verdict.outcome}: {verdict.reason}", name="evaluation"))
         name = f"{self._layout.name}_{self._layout.seed}_{verdict.outcome}.mcap"
         info = SourceInfo("scene", self._layout.name, self._layout.seed, {"lidar": "simulated SICK LMS1xx"})
-        notes = {"driver": self._policy, "outcome": verdict.outcome.value}
+        notes = {"light": self._layout.light, "driver": self._policy, "outcome": verdict.outcome.value}
         self._folder.mkdir(parents=True, exist_ok=True)
         with RecordingWriter(self._folder / name, info, self._config_toml, notes=notes) as writer:
             for message in self._messages:

@@ -62,6 +62,7 @@ def record_scene(
         source.info,
         dump_config(config),
         recording_id=random_id() if config.realtime else None,
+        notes={"light": layout.light},
         start_ns=start_ns,
         realtime=config.realtime,
     ) as writer:

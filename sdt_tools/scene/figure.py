@@ -37,16 +37,21 @@ def layout_figure(layouts: Layout | Sequence[Layout], paths: Sequence[Path2D], o
 
 
 def draw_layout(panel: Axes, layout: Layout) -> None:
-    """Walls, boxes, posts and the operator's path; x to the right, y up, metres."""
+    """The room and the operator's path; x to the right, y up, metres."""
+    draw_room(panel, layout)
+    way = np.array(layout.operator.path_m)
+    panel.plot(way[:, 0], way[:, 1], "o--", color="#e76f51", markersize=3, linewidth=1)
+    panel.plot(*way[0], "o", color="#e76f51", markersize=7)
+
+
+def draw_room(panel: Axes, layout: Layout) -> None:
+    """Walls, boxes and posts; x to the right, y up, metres."""
     for wall in layout.walls:
         panel.plot([wall.x0_m, wall.x1_m], [wall.y0_m, wall.y1_m], color="#343a40", linewidth=1.6)
     for box in layout.boxes:
         panel.add_patch(Polygon(box.corners(), facecolor="#ced4da", edgecolor="#343a40"))
     for post in layout.posts:
         panel.add_patch(Circle((post.x_m, post.y_m), post.radius_m, color="#343a40"))
-    way = np.array(layout.operator.path_m)
-    panel.plot(way[:, 0], way[:, 1], "o--", color="#e76f51", markersize=3, linewidth=1)
-    panel.plot(*way[0], "o", color="#e76f51", markersize=7)
     panel.set_aspect("equal")
 
 

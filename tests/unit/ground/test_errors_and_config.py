@@ -1,6 +1,7 @@
 from pathlib import Path
 
 import pytest
+from pydantic import Field
 
 from sdt_tools.config import Config, MotionConfig, RateConfig, dump_config, load_config
 from sdt_tools.errors import ConfigError
@@ -64,3 +65,18 @@ def test_mirroring_a_motion_mirrors_its_turn_alone() -> None:
     for motion in MotionClass:
         twist, mirrored = MotionConfig().twist(motion), MotionConfig().twist(motion.mirrored)
         assert (mirrored.linear_mps, mirrored.angular_radps) == (twist.linear_mps, -twist.angular_radps)
+
+
+class Wall(Config):
+    from_: float = Field(alias="from")
+    length: float
+
+
+def test_a_misspelt_required_key_is_explained_as_misspelt(tmp_path: Path) -> None:
+    with pytest.raises(ConfigError, match="unknown key 'lenght'; did you mean 'length'"):
+        load_config(Wall, write(tmp_path, "from = 1.0\nlenght = 2.0"))
+
+
+def test_a_key_is_suggested_by_the_name_that_files_call_it(tmp_path: Path) -> None:
+    with pytest.raises(ConfigError, match="unknown key 'frm'; did you mean 'from'"):
+        load_config(Wall, write(tmp_path, "frm = 1.0\nlength = 2.0"))
