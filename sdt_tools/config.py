@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any, TypeVar, get_args
 
 import tomli_w
-from pydantic import BaseModel, ConfigDict, ValidationError
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
 from pydantic.fields import FieldInfo
 
 from sdt_tools.errors import ConfigError
@@ -19,9 +19,9 @@ from sdt_tools.frames import MotionClass, Twist
 
 
 class Config(BaseModel):
-    """Base of all configuration: frozen, and without room for unknown keys."""
+    """Base of all configuration: frozen, its numbers finite, without room for unknown keys."""
 
-    model_config = ConfigDict(extra="forbid", frozen=True, arbitrary_types_allowed=False)
+    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
 
 
 ConfigT = TypeVar("ConfigT", bound=Config)
@@ -34,11 +34,11 @@ class MotionConfig(Config):
     counter-clockwise whichever way the robot drives.
     """
 
-    forward_mps: float = 0.5
-    turning_forward_mps: float = 0.35
-    backward_mps: float = 0.4
-    turning_backward_mps: float = 0.25
-    turn_radps: float = 0.9
+    forward_mps: float = Field(default=0.5, gt=0)
+    turning_forward_mps: float = Field(default=0.35, ge=0)
+    backward_mps: float = Field(default=0.4, gt=0)
+    turning_backward_mps: float = Field(default=0.25, ge=0)
+    turn_radps: float = Field(default=0.9, gt=0)
 
     def twist(self, motion: MotionClass) -> Twist:
         """The twist of ``motion``."""
@@ -53,10 +53,10 @@ class MotionConfig(Config):
 class RateConfig(Config):
     """How often sensors speak and networks decide, in hertz."""
 
-    scan_hz: float = 50.0
-    image_hz: float = 30.0
-    follow_hz: float = 10.0
-    vision_hz: float = 5.0
+    scan_hz: float = Field(default=50.0, gt=0, le=1000)
+    image_hz: float = Field(default=30.0, gt=0, le=1000)
+    follow_hz: float = Field(default=10.0, gt=0, le=1000)
+    vision_hz: float = Field(default=5.0, gt=0, le=1000)
 
 
 def load_config(model: type[ConfigT], path: Path | None) -> ConfigT:
@@ -77,6 +77,8 @@ def read_toml(path: Path) -> dict[str, Any]:
         raise ConfigError(f"{path}: is a folder; name the TOML file in it") from None
     except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
         raise ConfigError(f"{path}: not valid TOML: {error}") from None
+    except OSError as error:
+        raise ConfigError(f"{path}: cannot be read: {error.strerror}; check path and rights") from None
 
 
 def parse_config(model: type[ConfigT], values: Mapping[str, Any], where: str) -> ConfigT:
@@ -99,7 +101,9 @@ def _explain(model: type[Config], error: ValidationError) -> str:
     if first["type"] == "extra_forbidden":
         near = difflib.get_close_matches(str(first["loc"][-1]), _keys_at(model, first["loc"][:-1]), n=1, cutoff=0.0)
         return f"unknown key '{place}'" + (f"; did you mean '{near[0]}'?" if near else "")
-    reason = str(first["msg"])
+    reason = str(first["msg"]).removeprefix("Value error, ")
+    if first["type"] == "value_error":  # said by a rule of ours, which names what is wrong
+        return f"'{place}': {reason}" if place else reason
     return f"'{place}': {reason[:1].lower()}{reason[1:]}, not {first['input']!r}"
 
 

@@ -1,19 +1,23 @@
 """The command ``sdt``: its verbs, and the one place where errors become a line and an exit code."""
 
 import importlib
-import importlib.util
 import os
 import sys
 from types import ModuleType
+from typing import Final, NoReturn
 
 import typer
 from typer.core import TyperGroup
+from typer.exceptions import TyperException
 
 from sdt_tools.errors import SdtError
 from sdt_tools.runs.threads import use_one_thread
 
 VERBS = ("demo", "record", "inspect", "import", "label", "dataset", "train", "evaluate", "replay", "errors", "view")
 """In the order of the flow. Each is a module here (``import_`` for ``import``) with a ``command``, or an ``app``."""
+
+
+_INTERRUPTED: Final = 130
 
 
 class InOrderOfTheFlow(TyperGroup):
@@ -43,21 +47,29 @@ def _register(verb: str, module: ModuleType) -> None:
 
 
 for _verb in VERBS:
-    _name = f"sdt_tools.cli.{_verb}{'_' if _verb == 'import' else ''}"
-    if importlib.util.find_spec(_name):
-        _register(_verb, importlib.import_module(_name))
+    _register(_verb, importlib.import_module(f"sdt_tools.cli.{_verb}{'_' if _verb == 'import' else ''}"))
 
 
 def main() -> None:
     """Run the command line; exit 2 for bad usage or input, 1 for a failure, 130 when interrupted."""
     use_one_thread()
     try:
-        app()
+        code = app(standalone_mode=False)
     except SdtError as error:
-        sys.stderr.write(f"sdt: {error}\n")
-        sys.exit(error.exit_code)
+        _stop(str(error), error.exit_code)
+    except TyperException as error:
+        _stop(f"{error.format_message()} Try --help." if error.format_message() else "", error.exit_code)
     except BrokenPipeError:
         os._exit(141)
-    except KeyboardInterrupt:
-        sys.stderr.write("sdt: interrupted; what was finished is kept\n")
-        sys.exit(130)
+    except OSError as error:
+        _stop(f"{error.filename or 'the system'}: {error.strerror}; check path, rights and disk", 2)
+    if code == _INTERRUPTED:
+        _stop("interrupted; what was finished is kept", _INTERRUPTED)
+    sys.exit(code if isinstance(code, int) else 0)
+
+
+def _stop(line: str, code: int) -> NoReturn:
+    """Say why in one line, and exit."""
+    if line:
+        sys.stderr.write(f"sdt: {' '.join(line.split())}\n")
+    sys.exit(code)

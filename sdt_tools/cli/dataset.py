@@ -8,7 +8,7 @@ import typer
 from sdt_tools.cli.console import JsonFlag, console, emit
 
 if TYPE_CHECKING:
-    from sdt_tools.dataset.build import ConflictCheck, DatasetSummary
+    from sdt_tools.dataset.build import DatasetSummary
 
 app = typer.Typer(no_args_is_help=True, help="Build data sets from labelled recordings.")
 
@@ -48,6 +48,7 @@ def build(
     from sdt_tools.config import parse_config, read_toml
     from sdt_tools.dataset.build import build_dataset
     from sdt_tools.dataset.config import DatasetConfig
+    from sdt_tools.robustness.conflicts import conflict_check
 
     options = {
         "train_frames": train_frames,
@@ -66,19 +67,11 @@ def build(
     settings = parse_config(DatasetConfig, file_values, str(config))
     settings = parse_config(DatasetConfig, file_values | given, "the options")
     with progress_bar("reading recordings") as report:
-        summary = build_dataset(recordings, labels, settings, out, _conflict_check(settings.conflict_level), report)
+        summary = build_dataset(recordings, labels, settings, out, conflict_check(settings.conflict_level), report)
     if json_output:
         emit(_document(summary))
     else:
         _show(summary)
-
-
-def _conflict_check(level: int) -> "ConflictCheck":
-    """Safety domains speak of scans whose codes are resolved, so that is done first."""
-    from sdt_tools.models.preprocess import PreprocessConfig, resolve_codes
-    from sdt_tools.robustness.domains import SafetyLevel, conflicts
-
-    return lambda ranges_m, labels: conflicts(resolve_codes(ranges_m, PreprocessConfig()), labels, SafetyLevel(level))
 
 
 def _document(summary: "DatasetSummary") -> dict[str, object]:

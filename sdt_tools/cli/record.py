@@ -44,21 +44,22 @@ def scene(
     """Record the simulated robot. The same options give the same bytes, except with --realtime."""
     from sdt_tools.cli.drivers import make_driver
     from sdt_tools.cli.recording_progress import recording_progress
-    from sdt_tools.config import load_config
+    from sdt_tools.config import load_config, parse_config
     from sdt_tools.recording.perturb import PerturbConfig
     from sdt_tools.recording.scene_session import SceneRecordingConfig, record_scene
     from sdt_tools.scene.config import SceneConfig
 
-    recording = SceneRecordingConfig(
-        scenario=scenario,
-        seed=seed,
-        seconds=seconds,
-        driver=driver,
-        camera=not no_camera,
-        realtime=realtime,
-        perturb=PerturbConfig() if perturb else None,
-        scene=load_config(SceneConfig, config),
-    )
+    values = {
+        "scenario": scenario,
+        "seed": seed,
+        "seconds": seconds,
+        "driver": driver,
+        "camera": not no_camera,
+        "realtime": realtime,
+        "perturb": PerturbConfig() if perturb else None,
+        "scene": load_config(SceneConfig, config),
+    }
+    recording = parse_config(SceneRecordingConfig, values, "record scene")
     with recording_progress(f"recording {out.name}") as progress:
         summary = record_scene(recording, out, make_driver, progress=progress)
     if json_output:

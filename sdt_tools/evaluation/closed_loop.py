@@ -76,18 +76,21 @@ def drive_closed_loop(
 ) -> list[RunResult]:
     """Let ``policy`` drive each layout to its verdict; results come in the order of the layouts.
 
-    Scans are taken at ``rates.scan_hz``, decisions fall at ``rates.follow_hz`` on the newest of them. A run's
-    randomness is its seed's alone, so it does not depend on the runs beside it.
+    Scans are taken at ``rates.scan_hz``. Decisions are due ``rates.follow_hz`` times a second and fall on the next
+    scan, as in a recording. A run's randomness is its seed's alone: it does not depend on the runs beside it.
     """
-    scan_every = max(1, round(PHYSICS_HZ / config.scene.rates.scan_hz))
-    decide_every = max(scan_every, round(PHYSICS_HZ / config.scene.rates.follow_hz))
+    scan_every = round(PHYSICS_HZ / config.scene.rates.scan_hz)
+    decisions_a_tick = config.scene.rates.follow_hz / PHYSICS_HZ
+    decided = 0
     runs = [_start(layout, config, recorder_for) for layout in layouts]
     live, tick = runs, 0
     while live:
         if tick % scan_every == 0:
             true_ranges_m = _cast(live)
             scans = [_measure(run, ranges) for run, ranges in zip(live, true_ranges_m, strict=True)]
-            if tick % decide_every == 0:
+            due = math.floor(tick * decisions_a_tick + 1e-9) + 1
+            if due > decided:
+                decided = due
                 _decide(live, scans, true_ranges_m, policy, config)
                 live = [run for run in live if run.verdict is None]
         for run in live:

@@ -18,6 +18,7 @@ from sdt_tools.evaluation.results import RUNS_FILE, TRACES_FILE, Tally, tally, w
 from sdt_tools.evaluation.saving import SaveRuns, recorder_factory
 from sdt_tools.runs.local import Progress, run_units
 from sdt_tools.runs.unit import Unit, content_hash
+from sdt_tools.scene.layout import Layout
 from sdt_tools.scene.scenario import layout_for
 
 SEEDS_A_UNIT: Final = 10
@@ -58,12 +59,14 @@ def evaluate_follow(
     UsageError for empty or repeated arguments, and whatever loading a model or a scenario raises, before any run.
     """
     _check(models, scenarios, seeds)
-    units: dict[str, list[Unit]] = {}
-    for model in models:
-        name = _unit_name(model)
-        for scenario in scenarios:
-            layout_for(scenario, seeds[0])
-            units.setdefault(model, []).extend(_units(name, model, scenario, seeds, config, save))
+    drawn = [[layout_for(scenario, seed) for seed in seeds] for scenario in scenarios]
+    _refuse_repeated("scenario", [layouts[0].name for layouts in drawn])
+    names = {model: _unit_name(model) for model in models}
+    _refuse_repeated("model", list(names.values()))
+    units = {
+        model: [unit for layouts in drawn for unit in _units(names[model], model, layouts, config, save)]
+        for model in models
+    }
     folders = iter(run_units([unit for group in units.values() for unit in group], out, workers, progress))
     by_model = {model: [next(folders) for _ in group] for model, group in units.items()}
     every = [folder for group in by_model.values() for folder in group]
@@ -87,12 +90,9 @@ def parse_seeds(text: str) -> list[int]:
     return seeds
 
 
-def run_block(
-    out: Path, model: str, scenario: str, seeds: Sequence[int], config: ClosedLoopConfig, save: SaveRuns
-) -> None:
-    """One unit: a block of seeds of one model in one scenario."""
+def run_block(out: Path, model: str, layouts: Sequence[Layout], config: ClosedLoopConfig, save: SaveRuns) -> None:
+    """One unit: a block of one model's runs in one scenario."""
     policy = policy_for(model)
-    layouts = [layout_for(scenario, seed) for seed in seeds]
     recorder_for = recorder_factory(out / _RECORDINGS, policy.name, save, dump_config(config))
     started_s = time.perf_counter()
     results = drive_closed_loop(layouts, policy, config, recorder_for)
@@ -108,8 +108,13 @@ def _check(models: Sequence[str], scenarios: Sequence[str], seeds: Sequence[int]
     for what, given in (("model", models), ("scenario", scenarios), ("seed", seeds)):
         if not given:
             raise UsageError(f"no {what} given; name at least one")
-        if len(set(given)) < len(given):
-            raise UsageError(f"a {what} is given twice; name each once")
+        _refuse_repeated(what, given)
+
+
+def _refuse_repeated(what: str, names: Sequence[object]) -> None:
+    for name in names:
+        if names.count(name) > 1:
+            raise UsageError(f"{what} {name} is given twice; name each once")
 
 
 def _unit_name(model: str) -> str:
@@ -119,16 +124,14 @@ def _unit_name(model: str) -> str:
     return f"{policy.name.replace(':', '-')}-{identity[:8]}"
 
 
-def _units(
-    name: str, model: str, scenario: str, seeds: Sequence[int], config: ClosedLoopConfig, save: SaveRuns
-) -> list[Unit]:
-    blocks = [seeds[start : start + SEEDS_A_UNIT] for start in range(0, len(seeds), SEEDS_A_UNIT)]
-    where = Path(scenario).stem
+def _units(name: str, model: str, layouts: Sequence[Layout], config: ClosedLoopConfig, save: SaveRuns) -> list[Unit]:
+    """Blocks of runs. The worlds are drawn already, so that an edited scenario file makes other units."""
+    blocks = [layouts[start : start + SEEDS_A_UNIT] for start in range(0, len(layouts), SEEDS_A_UNIT)]
     return [
         Unit(
-            f"{name}/{where}/{block[0]}-{block[-1]}",
+            f"{name}/{block[0].name}/{block[0].seed}-{block[-1].seed}",
             run_block,
-            {"model": model, "scenario": scenario, "seeds": tuple(block), "config": config, "save": save},
+            {"model": model, "layouts": tuple(block), "config": config, "save": save},
         )
         for block in blocks
     ]

@@ -7,10 +7,6 @@ from pathlib import Path
 from sdt_tools.clock import FAST_EPOCH_NS
 from sdt_tools.evaluation.outcome import Outcome, Verdict
 from sdt_tools.frames import (
-    FRAME_BASE,
-    FRAME_LIDAR,
-    LIDAR_AHEAD_M,
-    FrameTransform,
     LidarScan,
     LogEntry,
     LogLevel,
@@ -23,8 +19,7 @@ from sdt_tools.frames import (
 )
 from sdt_tools.protocols import SourceInfo
 from sdt_tools.recording.writer import RecordingWriter
-from sdt_tools.scene.layout import Layout
-from sdt_tools.scene.source import LIDAR_HEIGHT_M
+from sdt_tools.scene.layout import Layout, lidar_mount
 from sdt_tools.scene.world import World
 
 
@@ -45,11 +40,7 @@ class MemoryRecorder:
         self._policy = policy
         self._keep = keep
         self._config_toml = config_toml
-        self._messages: list[Message] = [
-            FrameTransform(
-                FAST_EPOCH_NS, FRAME_BASE, FRAME_LIDAR, (LIDAR_AHEAD_M, 0.0, LIDAR_HEIGHT_M), (0.0, 0.0, 0.0, 1.0)
-            )
-        ]
+        self._messages: list[Message] = [lidar_mount(FAST_EPOCH_NS)]
 
     def scan(self, world: World, scan: LidarScan) -> None:
         """A scan was taken; the truth of its moment is kept beside it."""
@@ -73,7 +64,8 @@ class MemoryRecorder:
         end_ns = self._messages[-1].stamp_ns
         level = LogLevel.WARNING if failed else LogLevel.INFO
         self._messages.append(LogEntry(end_ns, level, f"{verdict.outcome}: {verdict.reason}", name="evaluation"))
-        name = f"{self._layout.name}_{self._layout.seed}_{verdict.outcome}.mcap"
+        driver = self._policy.replace(":", "-")
+        name = f"{driver}_{self._layout.name}_{self._layout.seed}_{verdict.outcome}.mcap"
         info = SourceInfo("scene", self._layout.name, self._layout.seed, {"lidar": "simulated SICK LMS1xx"})
         notes = {"light": self._layout.light, "driver": self._policy, "outcome": verdict.outcome.value}
         self._folder.mkdir(parents=True, exist_ok=True)

@@ -46,7 +46,7 @@ def import_lidar_csv(path: Path, out: Path, hz: float) -> ImportSummary:
     ``out`` appears when all of it is written. Raises RecordingError, naming the line, for a file that is missing, empty
     or no such drive, UsageError for a rate that is not positive, OutputExistsError.
     """
-    if not hz > 0:
+    if not 0.01 <= hz <= 10_000:
         raise UsageError(f"--hz {hz:g}: give the scans a second, as in 25 or 50")
     if out.exists():
         raise OutputExistsError(out)

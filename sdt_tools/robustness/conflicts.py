@@ -1,14 +1,8 @@
 """The paper's non-conflict assumption, asked of data: no label may be one that a safety domain forbids."""
 
-from collections.abc import Callable
-
-import numpy as np
-from jaxtyping import Bool, Float, Integer
-
+from sdt_tools.dataset.build import ConflictCheck
 from sdt_tools.models.preprocess import PreprocessConfig, resolve_codes
 from sdt_tools.robustness.domains import SafetyLevel, conflicts
-
-ConflictCheck = Callable[[Float[np.ndarray, "frames rays"], Integer[np.ndarray, "frames"]], Bool[np.ndarray, "frames"]]
 
 
 def conflict_check(level: int) -> ConflictCheck:

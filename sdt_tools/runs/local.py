@@ -1,6 +1,7 @@
 """Units mapped over processes of this machine: one thread each, one process a core."""
 
 import multiprocessing
+import signal
 from collections.abc import Callable, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from pathlib import Path
@@ -38,7 +39,7 @@ def run_units(units: Sequence[Unit], root: Path, workers: int = 1, progress: Pro
 
 def _run_in_processes(units: Sequence[Unit], root: Path, workers: int, report: Callable[[int], None]) -> None:
     context = multiprocessing.get_context("spawn")
-    with ProcessPoolExecutor(min(workers, len(units)), mp_context=context, initializer=use_one_thread) as pool:
+    with ProcessPoolExecutor(min(workers, len(units)), mp_context=context, initializer=_begin_worker) as pool:
         pending: set[Future[Path]] = {pool.submit(execute, unit, root) for unit in units}
         finished_now = 0
         try:
@@ -50,7 +51,15 @@ def _run_in_processes(units: Sequence[Unit], root: Path, workers: int, report: C
                 report(finished_now)
         except BaseException:
             pool.shutdown(wait=False, cancel_futures=True)
+            for worker in multiprocessing.active_children():
+                worker.terminate()
             raise
+
+
+def _begin_worker() -> None:
+    """One thread; Ctrl-C is the parent's to hear, who then ends its workers."""
+    use_one_thread()
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
 
 
 def _silent(_done: int, _total: int) -> None:

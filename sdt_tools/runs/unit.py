@@ -65,8 +65,8 @@ def execute(unit: Unit, root: Path) -> Path:
     fingerprint = unit.fingerprint()
     if finished(unit, root):
         return folder
+    _sweep(folder)
     scratch = folder.with_name(f".{folder.name}.{os.getpid()}.part")
-    shutil.rmtree(scratch, ignore_errors=True)
     scratch.mkdir(parents=True)
     started = time.monotonic()
     try:
@@ -90,7 +90,7 @@ def code_version() -> str:
     """The package's version and a short hash of its source files, as in ``0.1.0+3f2a9c1b``."""
     package = Path(__file__).parents[1]
     digest = hashlib.sha256()
-    for file in sorted(package.rglob("*.py")):
+    for file in sorted([*package.rglob("*.py"), *package.rglob("*.toml")]):
         digest.update(str(file.relative_to(package)).encode() + b"\0" + file.read_bytes())
     return f"{__version__}+{digest.hexdigest()[:8]}"
 
@@ -113,6 +113,24 @@ def _recorded_fingerprint(folder: Path) -> str | None:
         return str(json.loads((folder / RECORD).read_text(encoding="utf-8"))["fingerprint"])
     except (OSError, ValueError, KeyError):
         return None
+
+
+def _sweep(folder: Path) -> None:
+    """Remove what processes that are gone have left half done; another one that is at work keeps its own."""
+    for scratch in folder.parent.glob(f".{folder.name}.*.part"):
+        pid = int(scratch.name.split(".")[-2])
+        if pid == os.getpid() or not _alive(pid):
+            shutil.rmtree(scratch, ignore_errors=True)
+
+
+def _alive(pid: int) -> bool:
+    try:
+        os.kill(pid, 0)
+    except ProcessLookupError:
+        return False
+    except PermissionError:
+        return True
+    return True
 
 
 def _canonical(value: object) -> str:

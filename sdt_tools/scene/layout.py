@@ -5,11 +5,12 @@ Metres, radians and seconds, in the frame of the scenario: x ahead of the robot'
 
 import math
 from dataclasses import dataclass, field
+from typing import Final
 
 import numpy as np
 from jaxtyping import Float64
 
-from sdt_tools.frames import LIDAR_AHEAD_M, Gesture, Pose2D
+from sdt_tools.frames import FRAME_BASE, FRAME_LIDAR, LIDAR_AHEAD_M, FrameTransform, Gesture, Pose2D
 
 
 @dataclass(frozen=True)
@@ -108,6 +109,15 @@ class Layout:
         """Everything round that stands still: x, y, radius of the posts."""
         rows = [(post.x_m, post.y_m, post.radius_m) for post in self.posts]
         return np.array(rows, dtype=np.float64).reshape(-1, 3)
+
+
+LIDAR_HEIGHT_M: Final = 0.35
+"""Height of the scan plane above the floor: shins, not feet."""
+
+
+def lidar_mount(stamp_ns: int) -> FrameTransform:
+    """Where the LiDAR stands on the robot, as a message of that moment."""
+    return FrameTransform(stamp_ns, FRAME_BASE, FRAME_LIDAR, (LIDAR_AHEAD_M, 0.0, LIDAR_HEIGHT_M), (0.0, 0.0, 0.0, 1.0))
 
 
 def lidar_pose(robot: Pose2D) -> Pose2D:

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Annotated, Final, Literal
 
 import numpy as np
-from pydantic import BeforeValidator, Field, model_validator
+from pydantic import AfterValidator, BeforeValidator, Field, model_validator
 
 from sdt_tools.config import Config, load_config
 from sdt_tools.errors import ConfigError
@@ -47,7 +47,21 @@ def _as_span(value: object) -> object:
     raise ValueError("a number or { low = …, high = … } is needed")
 
 
+def _positive(span: Span) -> Span:
+    if span.low <= 0:
+        raise ValueError(f"must be greater than 0, not {span.low:g}")
+    return span
+
+
+def _not_negative(span: Span) -> Span:
+    if span.low < 0:
+        raise ValueError(f"must not be less than 0, not {span.low:g}")
+    return span
+
+
 Number = Annotated[Span, BeforeValidator(_as_span)]
+Positive = Annotated[Number, AfterValidator(_positive)]
+NotNegative = Annotated[Number, AfterValidator(_not_negative)]
 Point = tuple[Number, Number]
 
 
@@ -67,15 +81,15 @@ class OperatorSpec(Config):
     """What the operator does; his legs and stride are drawn for each seed."""
 
     path: tuple[Point, ...] = Field(min_length=1)
-    speed_mps: Number = Span(low=0.4, high=0.7)
-    waits_at_lead_m: Number = _fixed(1.8)
-    pauses_s: tuple[Number, ...] = ()
+    speed_mps: Positive = Span(low=0.4, high=0.7)
+    waits_at_lead_m: Positive = _fixed(1.8)
+    pauses_s: tuple[NotNegative, ...] = ()
     """Rest at each point of the path; missing ones are 0."""
-    keeps_away_m: Number = _fixed(0.4)
-    patience_s: Number = _fixed(4.0)
-    leg_radius_m: Number = Span(low=0.05, high=0.075)
-    leg_separation_m: Number = Span(low=0.2, high=0.32)
-    step_length_m: Number = Span(low=0.3, high=0.5)
+    keeps_away_m: NotNegative = _fixed(0.4)
+    patience_s: NotNegative = _fixed(4.0)
+    leg_radius_m: Positive = Span(low=0.05, high=0.075)
+    leg_separation_m: Positive = Span(low=0.2, high=0.32)
+    step_length_m: Positive = Span(low=0.3, high=0.5)
 
     @model_validator(mode="after")
     def _pauses_fit(self) -> "OperatorSpec":
@@ -96,10 +110,10 @@ class BoxSpec(Config):
 
     x: Number
     y: Number
-    length: Number
-    width: Number
+    length: Positive
+    width: Positive
     yaw_deg: Number = _fixed(0.0)
-    height: Number = _fixed(0.6)
+    height: Positive = _fixed(0.6)
 
 
 class PostSpec(Config):
@@ -107,21 +121,22 @@ class PostSpec(Config):
 
     x: Number
     y: Number
-    radius: Number
+    radius: Positive
 
 
 class GestureSpec(Config):
     """A gesture of the operator."""
 
-    at_s: Number
+    at_s: NotNegative
     gesture: Literal["idle", "enable", "disable"]
-    lasts_s: Number = _fixed(2.0)
+    lasts_s: Positive = _fixed(2.0)
 
 
 class Scenario(Config):
     """A scenario file."""
 
-    name: str
+    name: str = Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9_-]*$")
+    """Goes into the names of files: letters, digits, _ and -."""
     timeout_s: float = Field(default=90.0, gt=0)
     mirror: bool = False
     robot: RobotSpec = RobotSpec()

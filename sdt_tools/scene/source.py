@@ -7,11 +7,7 @@ import numpy as np
 
 from sdt_tools.clock import FAST_EPOCH_NS, SECOND_NS
 from sdt_tools.frames import (
-    FRAME_BASE,
-    FRAME_LIDAR,
-    LIDAR_AHEAD_M,
     RAYS,
-    FrameTransform,
     LidarScan,
     LogEntry,
     LogLevel,
@@ -26,14 +22,12 @@ from sdt_tools.frames import (
 from sdt_tools.protocols import SourceInfo
 from sdt_tools.scene.config import PHYSICS_HZ, SceneConfig
 from sdt_tools.scene.expert import SceneExpert
-from sdt_tools.scene.layout import Layout
+from sdt_tools.scene.layout import Layout, lidar_mount
 from sdt_tools.scene.raycast import cast_rays
 from sdt_tools.scene.seeds import Stream, generator
 from sdt_tools.scene.sensor import SensorModel
 from sdt_tools.scene.world import World
 
-LIDAR_HEIGHT_M: Final = 0.35
-"""Height of the scan plane above the floor: it meets shins, not feet."""
 _STEP_NS: Final = SECOND_NS // PHYSICS_HZ
 
 
@@ -134,8 +128,7 @@ class SceneSource:
             yield LogEntry(now_ns, LogLevel.WARNING, f"the robot touched {world.contact}", "scene")
 
     def _introduction(self) -> Iterator[Message]:
-        to_lidar_m = (LIDAR_AHEAD_M, 0.0, LIDAR_HEIGHT_M)
-        yield FrameTransform(self._start_ns, FRAME_BASE, FRAME_LIDAR, to_lidar_m, (0.0, 0.0, 0.0, 1.0))
+        yield lidar_mount(self._start_ns)
         if self._film is not None:
             yield from self._film.introduction()
 

@@ -120,3 +120,38 @@ def test_errors_without_labels_say_what_to_do(sdt: Sdt, model: Path, tmp_path: P
     result = sdt("errors", "p.parquet", "--recordings", recording, "--out", "e")
     assert_refused(result, "label")
     assert not (tmp_path / "e").exists()
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (["fly"], "No such command 'fly'"),
+        (["record", "scene"], "Missing option '--out'"),
+        (["record", "scene", "--seed", "-1", "--out", "x"], "'--seed'"),
+        (["record", "scene", "--seconds", "inf", "--out", "x"], "seconds"),
+        (["import", "lidar-csv", "x.csv", "--hz", "inf", "--out", "x"], "--hz inf"),
+    ],
+)
+def test_a_wrong_call_is_one_line_too(sdt: Sdt, words: list[str], said: str) -> None:
+    assert_refused(sdt(*words), said)
+
+
+def test_a_folder_that_cannot_be_made_is_named(sdt: Sdt, tmp_path: Path) -> None:
+    (tmp_path / "file").write_text("")
+    result = sdt("evaluate", "follow", "expert", "--scenario", "plain", "--seeds", 0, "--out", "file/x")
+    assert_refused(result, "file/x", "Not a directory")
+
+
+@pytest.mark.parametrize(
+    ("line", "said"),
+    [
+        ('name = "../evil"', "'name'"),
+        ('name = "x"\ntimeout_s = inf', "'timeout_s'"),
+        ('name = "x"\npost = [{ x = 1, y = 1, radius = -0.1 }]', "greater than 0, not -0.1"),
+        ('name = "x"\nbox = [{ x = 0, y = 0, length = 2, width = 2 }]', "robot starts inside box 0"),
+    ],
+)
+def test_a_scenario_that_cannot_be_is_refused(sdt: Sdt, tmp_path: Path, line: str, said: str) -> None:
+    (tmp_path / "own.toml").write_text(line + "\noperator = { path = [[1.5, 0.0], [4.0, 0.0]] }\n")
+    assert_refused(sdt("record", "scene", "--scenario", "own.toml", "--no-camera", "--out", "x.mcap"), said)
+    assert not (tmp_path / "x.mcap").exists()

@@ -17,6 +17,7 @@ from sdt_tools.models.card import ModelCard
 from sdt_tools.models.checkpoint import save_checkpoint
 from sdt_tools.models.follow_net import FollowNet, FollowNetConfig, new_follow_net
 from sdt_tools.models.preprocess import PreprocessConfig
+from sdt_tools.scene.scenario import layout_for
 
 ROOT = Path(__file__).parents[2]
 README = (ROOT / "README.md").read_text(encoding="utf-8")
@@ -56,6 +57,12 @@ def test_the_commands_run_in_the_order_they_are_given(workplace: Path, number: i
     call = ["bash", "-euo", "pipefail", "-c", script]
     done = subprocess.run(call, cwd=workplace, env={**os.environ, "PATH": path}, capture_output=True, text=True)
     assert done.returncode == 0, done.stderr
+
+
+def test_the_scenario_can_be_played(tmp_path: Path) -> None:
+    (example,) = re.findall(r"```toml\n(.*?)```", README, re.DOTALL)
+    (tmp_path / "my_room.toml").write_text(example)
+    assert {layout_for(str(tmp_path / "my_room.toml"), seed).name for seed in range(20)} == {"my_room"}
 
 
 def test_what_is_made_smaller_is_in_the_readme() -> None:

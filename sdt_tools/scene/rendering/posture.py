@@ -4,6 +4,7 @@ import math
 from typing import Final
 
 from sdt_tools.frames import Gesture
+from sdt_tools.scene.layout import LIDAR_HEIGHT_M
 from sdt_tools.scene.rendering.mesh import Vector, vector
 from sdt_tools.scene.rendering.person import GestureStyle, Person
 from sdt_tools.scene.rendering.skeleton import ArmPosture, LegPosture, Posture, about_y
@@ -11,8 +12,6 @@ from sdt_tools.scene.rendering.skeleton import ArmPosture, LegPosture, Posture, 
 _HIP_SHARE: Final = 0.52
 """Height of the hip joint, as a share of the person's height; and how far out it is."""
 _HIP_OUT_SHARE: Final = 0.05
-_SCAN_PLANE_M: Final = 0.35
-"""Where the LiDAR meets the legs: there they are where it sees them."""
 
 
 def posture_of(
@@ -28,7 +27,9 @@ def posture_of(
     The left shin is ``stride_m`` · sin(``gait_phase_rad``) ahead of the hips, the right one as far behind.
     ``gesture_share`` runs from 0 (arms as in idle) to 1 (gesture fully made).
     """
-    thigh_to_plane_m = _HIP_SHARE * person.height_m - _SCAN_PLANE_M
+    thigh_to_plane_m = (
+        _HIP_SHARE * person.height_m - LIDAR_HEIGHT_M
+    )  # where the LiDAR meets the legs, they are as it sees them
     swing = math.atan2(stride_m, thigh_to_plane_m)
     arms = (
         _arm(person.style, True, gait_phase_rad, swing, gesture, gesture_share, time_s),

@@ -1,3 +1,4 @@
+from importlib.resources import files
 from pathlib import Path
 
 import polars as pl
@@ -40,6 +41,32 @@ def test_decisions_fall_ten_times_a_second() -> None:
     (run,) = drive_closed_loop([layout_for("plain", 0)], ConstantPolicy(MotionClass.STAY), CONFIG)
     times_s = [point.time_s for point in run.trace]
     assert times_s[:3] == pytest.approx([0.0, 0.1, 0.2])
+
+
+def test_decisions_keep_their_rate_when_scans_come_half_as_often() -> None:
+    config = ClosedLoopConfig.model_validate({"scene": {"rates": {"scan_hz": 25.0}}})
+    (run,) = drive_closed_loop([layout_for("plain", 0)], ConstantPolicy(MotionClass.STAY), config)
+    times_s = [point.time_s for point in run.trace]
+    assert times_s[:5] == pytest.approx([0.0, 0.12, 0.2, 0.32, 0.4])
+
+
+def test_an_edited_scenario_file_is_driven_again(tmp_path: Path) -> None:
+    scenario = tmp_path / "own.toml"
+    packaged = files("sdt_tools.scene").joinpath("scenarios/plain.toml").read_text()
+    own = packaged.replace('name = "plain"', 'name = "own"')
+    counts = []
+    for text in (own, own.replace("timeout_s = 90", "timeout_s = 2")):
+        scenario.write_text(text)
+        summary = evaluate_follow(["expert"], [str(scenario)], [0], CONFIG, tmp_path / "out")
+        counts.append(summary.models["expert"]["own"].outcomes)
+    assert (counts[0]["ok"], counts[1]["timeout"]) == (1, 1)
+
+
+def test_two_scenarios_of_one_name_are_not_mixed(tmp_path: Path) -> None:
+    scenario = tmp_path / "mine.toml"
+    scenario.write_text(files("sdt_tools.scene").joinpath("scenarios/plain.toml").read_text())
+    with pytest.raises(UsageError, match="scenario plain is given twice"):
+        evaluate_follow(["expert"], ["plain", str(scenario)], [0], CONFIG, tmp_path / "out")
 
 
 def test_a_saved_run_is_an_ordinary_recording_with_the_experts_advice(tmp_path: Path) -> None:
@@ -85,7 +112,7 @@ def test_an_evaluation_counts_by_model_and_scenario_and_is_not_run_twice(tmp_pat
     [
         (["constant:fly"], "plain", "'fly': no such motion class; the classes are stay, forward"),
         (["expert"], "plane", "plane"),
-        (["expert", "expert"], "plain", "a model is given twice"),
+        (["expert", "expert"], "plain", "model expert is given twice"),
         ([], "plain", "no model given"),
     ],
 )

@@ -65,6 +65,14 @@ def test_a_unit_that_breaks_leaves_nothing_and_keeps_the_old_result(tmp_path: Pa
     assert sorted(p.name for p in tmp_path.iterdir()) == ["a", "log"]
 
 
+def test_what_a_killed_process_left_half_done_is_swept_away(tmp_path: Path) -> None:
+    gone, alive = tmp_path / ".a.999999999.part", tmp_path / ".a.1.part"
+    for scratch in (gone, alive):
+        scratch.mkdir()
+    execute(text_unit("a", "one", tmp_path / "log"), tmp_path)
+    assert (gone.exists(), alive.exists()) == (False, True)
+
+
 def test_an_error_meant_for_the_user_passes_unchanged(tmp_path: Path) -> None:
     with pytest.raises(UsageError, match="bad input; give another"):
         execute(Unit("a", refuse, {}), tmp_path)
