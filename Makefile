@@ -10,7 +10,7 @@ demo: $(READY)
 	$(BIN)/sdt demo --out analysis/demo
 
 test: $(READY)
-	$(BIN)/python -m pytest -n 2 -m "not slow" --ignore=tests/bench
+	$(BIN)/python -m pytest -n 2 --dist loadgroup -m "not slow" --ignore=tests/bench
 
 test-slow: $(READY)
 	$(BIN)/python -m pytest -m slow

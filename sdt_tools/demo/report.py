@@ -103,7 +103,9 @@ Conditions are found on one half of the recordings and confirmed on the other, o
 
 ![Tags]({tags})
 
-![Neighbourhood]({epsilon})"""
+![Neighbourhood]({epsilon})
+
+{chr(10).join(f"- {warning}" for warning in tagged["warnings"])}"""
 
 
 def _condition(condition: Mapping[str, Any]) -> str:

@@ -7,6 +7,7 @@ import pytest
 import rerun.chunk
 from mcap.reader import make_reader
 
+pytestmark = pytest.mark.xdist_group("demo")  # one demo for all of them
 SDT = Path(sys.executable).with_name("sdt")
 SMALL = """
 practice_recordings = 16
