@@ -18,7 +18,6 @@ fitted.
 
 import math
 from bisect import bisect_left
-from collections.abc import Sequence
 from statistics import NormalDist
 from typing import Final, no_type_check
 
@@ -165,16 +164,6 @@ def _rays_at(normal: float) -> float:
         return _QUANTILES[-1][1]
     (z0, rays0), (z1, rays1) = _QUANTILES[above - 1], _QUANTILES[above]
     return rays0 + (normal - z0) / (z1 - z0) * (rays1 - rays0)
-
-
-def measure_many(
-    sensors: Sequence[SensorModel], true_ranges_m: Float64[np.ndarray, "scenes rays"]
-) -> Float64[np.ndarray, "scenes rays"]:
-    """One scan of each sensor; each row is what its sensor would have reported alone."""
-    out = np.empty_like(true_ranges_m)
-    for sensor, truth, row in zip(sensors, true_ranges_m, out, strict=True):
-        sensor.measure_into(truth, row)
-    return out
 
 
 @njit(cache=True)
