@@ -97,7 +97,7 @@ def dump_config(config: Config) -> str:
 def _explain(model: type[Config], error: ValidationError) -> str:
     unknown_keys = [one for one in error.errors() if one["type"] == "extra_forbidden"]
     first = (unknown_keys or error.errors())[0]  # a misspelt key is also a missing one
-    place = ".".join(str(part) for part in first["loc"])
+    place = ".".join(str(part) for part in _without_tags(model, first["loc"]))
     if first["type"] == "extra_forbidden":
         near = difflib.get_close_matches(str(first["loc"][-1]), _keys_at(model, first["loc"][:-1]), n=1, cutoff=0.0)
         return f"unknown key '{place}'" + (f"; did you mean '{near[0]}'?" if near else "")
@@ -105,6 +105,15 @@ def _explain(model: type[Config], error: ValidationError) -> str:
     if first["type"] == "value_error":  # said by a rule of ours, which names what is wrong
         return f"'{place}': {reason}" if place else reason
     return f"'{place}': {reason[:1].lower()}{reason[1:]}, not {first['input']!r}"
+
+
+def _without_tags(model: type[BaseModel], place: tuple[int | str, ...]) -> list[int | str]:
+    """The steps of ``place`` that a file has; which member of a union was tried is none of them."""
+    return [
+        step
+        for number, step in enumerate(place)
+        if isinstance(step, int) or number == len(place) - 1 or step in _keys_at(model, place[:number])
+    ]
 
 
 def _keys_at(model: type[BaseModel], place: tuple[int | str, ...]) -> list[str]:

@@ -8,6 +8,8 @@ import typer
 from sdt_tools.cli.console import JsonFlag, console, emit
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping
+
     from sdt_tools.training.follow import FollowTrainingConfig, TrainingSummary
 
 app = typer.Typer(no_args_is_help=True, help="Train networks on data sets.")
@@ -22,12 +24,34 @@ def train() -> None:
 def follow(
     dataset: Annotated[Path, typer.Argument(metavar="DATASET", help="Folder that 'sdt dataset build' made.")],
     out: Annotated[Path, typer.Option(help="Checkpoint folder to make: weights, model.toml, learning curve.")],
-    config: Annotated[Path | None, typer.Option(help="TOML file; the options below go before it.")] = None,
+    level: Annotated[
+        int | None, typer.Option(min=0, max=4, help="Safety level: 0 asks for nothing, 1 to 3 are the paper's. [0]")
+    ] = None,
+    domains: Annotated[Path | None, typer.Option(help="Safety domains of your own, a TOML file.")] = None,
+    epsilon_m: Annotated[
+        float | None, typer.Option(help="Adversarial training: labels hold within so many metres of every range.")
+    ] = None,
+    arch: Annotated[str | None, typer.Option(help="plain, the paper's network, or gate. [plain]")] = None,
+    inner: Annotated[
+        str | None, typer.Option(help="Worst case by ibp, bounded (certified), or pgd, searched (empirical). [ibp]")
+    ] = None,
+    weight: Annotated[
+        float | None, typer.Option("--lambda", help="Weight of the safety domains, the paper's λ.")
+    ] = None,
+    delta: Annotated[
+        float | None, typer.Option(help="Safety bound in nats at which training may end, the paper's δ. [0.2]")
+    ] = None,
+    config: Annotated[
+        Path | None, typer.Option(help="TOML file, instead of the settings known to work; the options go before it.")
+    ] = None,
     seed: Annotated[int | None, typer.Option(help="First weights, order of frames, variations. [0]")] = None,
     epochs: Annotated[int | None, typer.Option(help="Passes over the training frames. [80]")] = None,
     json_output: JsonFlag = False,
 ) -> None:
-    """Train the follow network (541 ranges to seven motions); Ctrl-C keeps the best epoch so far."""
+    """Train the follow network (541 ranges to seven motions), with safety domains if asked.
+
+    Interrupted with Ctrl-C, the same command goes on where it was.
+    """
     from rich.progress import (
         BarColumn,
         MofNCompleteColumn,
@@ -37,10 +61,21 @@ def follow(
         TimeRemainingColumn,
     )
 
-    from sdt_tools.training.follow import train_follow
-    from sdt_tools.training.loop import EpochRecord
+    from sdt_tools.training.follow import train_follow, unfinished
+    from sdt_tools.training.record import EpochRecord
 
-    settings = _settings(config, seed, epochs)
+    asked = {
+        "arch": arch,
+        "seed": seed,
+        "specification.level": level,
+        "specification.domains": domains,
+        "specification.epsilon_m": epsilon_m,
+        "safety.inner": inner,
+        "safety.weight": weight,
+        "safety.delta": delta,
+        "loop.epochs": epochs,
+    }
+    settings = _settings(config, {name: value for name, value in asked.items() if value is not None})
     columns = (
         TextColumn("epoch"),
         MofNCompleteColumn(),
@@ -55,34 +90,56 @@ def follow(
 
         def show(record: EpochRecord, total: int) -> None:
             text = f"loss {record.train_loss:.3f}  validation {record.val_accuracy:.1%}"
-            bar.update(task, completed=record.epoch, total=total, description=text)
+            if record.bound is not None:
+                text += f"  bound {record.bound:.2g}  certified {record.certified_share:.0%}"
+            bar.update(task, completed=record.epoch, total=max(total, record.epoch), description=text)
 
-        summary = train_follow(dataset, settings, out, show)
+        try:
+            summary = train_follow(dataset, settings, out, show)
+        except KeyboardInterrupt:
+            if unfinished(out).exists():
+                console.print(f"the state is in {unfinished(out)}; the same command goes on from there")
+            raise
     if json_output:
         emit(_document(summary))
     else:
         _show(summary)
+    if summary.satisfied is False:
+        _refuse_unsatisfied(summary, settings)
 
 
-def _settings(config: Path | None, seed: int | None, epochs: int | None) -> "FollowTrainingConfig":
+def _settings(config: Path | None, asked: "Mapping[str, object]") -> "FollowTrainingConfig":
+    """What a file or the recipe for the specification and architecture asked for says, and then the options."""
     from sdt_tools.config import load_config, parse_config
     from sdt_tools.training.follow import FollowTrainingConfig
+    from sdt_tools.training.recipes import recipe_for
+    from sdt_tools.training.specification import SpecificationConfig
 
-    values = load_config(FollowTrainingConfig, config).model_dump(mode="json")
-    if seed is not None:
-        values["seed"] = seed
-    if epochs is not None:
-        values["loop"]["epochs"] = epochs
+    if config is not None:
+        base = load_config(FollowTrainingConfig, config)
+    else:
+        wanted = {name.partition(".")[2]: value for name, value in asked.items() if name.startswith("specification.")}
+        base = recipe_for(
+            parse_config(SpecificationConfig, wanted, "the options"), str(asked.get("arch", "plain")), "--arch"
+        )
+    values = base.model_dump(mode="json", exclude_none=True)
+    for name, value in asked.items():
+        *tables, key = name.split(".")
+        table = values
+        for step in tables:
+            table = table[step]
+        table[key] = value
     return parse_config(FollowTrainingConfig, values, "the options")
 
 
 def _document(summary: "TrainingSummary") -> dict[str, object]:
     return {
         "checkpoint": str(summary.out),
-        "epochs": summary.epochs,
-        "kept_epoch": summary.kept_epoch,
-        "interrupted": summary.interrupted,
+        "epochs": summary.last.epoch,
         "seconds": round(summary.seconds, 1),
+        "satisfied": summary.satisfied,
+        "bound": summary.last.bound,
+        "certified_share": summary.last.certified_share,
         **summary.train.as_metrics("train"),
         **summary.val.as_metrics("val"),
     }
@@ -91,10 +148,7 @@ def _document(summary: "TrainingSummary") -> dict[str, object]:
 def _show(summary: "TrainingSummary") -> None:
     from rich.table import Table
 
-    ended = "interrupted after" if summary.interrupted else "trained"
-    console.print(
-        f"{ended} {summary.epochs} epochs in {summary.seconds:.0f} s; weights of epoch {summary.kept_epoch} kept"
-    )
+    console.print(f"trained {summary.last.epoch} epochs in {summary.seconds:.0f} s")
     table = Table()
     for heading in ("", "training", "validation"):
         table.add_column(heading, justify="right" if heading else "left")
@@ -105,4 +159,18 @@ def _show(summary: "TrainingSummary") -> None:
     for label, share in train.recall.items():
         table.add_row(f"recall of {label}", f"{share:.1%}", f"{val.recall[label]:.1%}")
     console.print(table)
+    if summary.last.bound is not None:
+        console.print(
+            f"largest worst-case loss of a domain: {summary.last.bound:.3g} nats; interval bounds certify "
+            f"{summary.last.certified_share:.1%} of the domains"
+        )
     console.print(f"checkpoint with curve.png: {summary.out}")
+
+
+def _refuse_unsatisfied(summary: "TrainingSummary", settings: "FollowTrainingConfig") -> None:
+    from sdt_tools.errors import RunError
+
+    raise RunError(
+        f"{summary.out}: after {summary.last.epoch} epochs the safety bound is {summary.last.bound:.3g} nats, above "
+        f"delta = {settings.safety.delta:g}; the checkpoint is kept; try a larger --delta, --lambda or --epochs"
+    )

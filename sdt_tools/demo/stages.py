@@ -60,10 +60,8 @@ def dataset_stage(out: Path, recordings: Sequence[Path], labels: Path, config: D
 
 
 def train_stage(out: Path, dataset: Path, config: FollowTrainingConfig, progress: Progress | None = None) -> None:
-    """Train the network of level 0. An interrupted training is no finished stage: the interruption goes on."""
+    """Train the network of level 0."""
     summary = train_follow(dataset / DATASET, config, out / MODEL, progress)
-    if summary.interrupted:
-        raise KeyboardInterrupt
     _note(
         out,
         {

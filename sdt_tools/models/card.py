@@ -1,18 +1,30 @@
 """What a checkpoint says of itself: enough to rebuild the network, and to know what it was made from."""
 
 from collections.abc import Mapping
-from typing import Final
+from typing import Annotated, Final
 
 import tomli_w
-from pydantic import Field, JsonValue
+from pydantic import Discriminator, Field, JsonValue, Tag
 
 from sdt_tools import __version__
 from sdt_tools.config import Config
 from sdt_tools.frames import MotionClass
 from sdt_tools.models.follow_net import FollowNetConfig
+from sdt_tools.models.gated_net import GatedNetConfig
 from sdt_tools.models.preprocess import PreprocessConfig
 
 FORMAT: Final = 1
+
+
+def _shape_of(architecture: object) -> str:
+    gated = "trunk" in architecture if isinstance(architecture, Mapping) else isinstance(architecture, GatedNetConfig)
+    return "gate" if gated else "plain"
+
+
+Architecture = Annotated[
+    Annotated[FollowNetConfig, Tag("plain")] | Annotated[GatedNetConfig, Tag("gate")], Discriminator(_shape_of)
+]
+"""Shape of a network; that of a gated one has a ``trunk``."""
 
 
 class ModelCard(Config):
@@ -29,7 +41,7 @@ class ModelCard(Config):
     seed: int
     dataset: str = ""
     dataset_hash: str = ""
-    architecture: FollowNetConfig
+    architecture: Architecture
     preprocess: PreprocessConfig
     training: Mapping[str, JsonValue] = Field(default_factory=dict)
     metrics: Mapping[str, JsonValue] = Field(default_factory=dict)

@@ -8,7 +8,7 @@ import shutil
 import tomllib
 from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import Final
+from typing import Final, TypeVar
 
 import torch
 from safetensors import SafetensorError
@@ -20,14 +20,33 @@ from sdt_tools.config import parse_config
 from sdt_tools.errors import CheckpointError, ConfigError, OutputExistsError
 from sdt_tools.frames import MotionClass
 from sdt_tools.models.card import FORMAT, ModelCard, card_to_toml
-from sdt_tools.models.follow_net import FollowNet
+from sdt_tools.models.follow_net import FollowNet, FollowNetConfig
+from sdt_tools.models.gated_net import GatedFollowNet, GatedNetConfig
 from sdt_tools.models.loaded import LoadedModel
 
 WEIGHTS: Final = "weights.safetensors"
 CARD: Final = "model.toml"
 
+_ShapeT = TypeVar("_ShapeT", FollowNetConfig, GatedNetConfig)
+
+
+def _plain(card: ModelCard) -> FollowNet:
+    return FollowNet(_architecture(card, FollowNetConfig), card.preprocess)
+
+
+def _gated(card: ModelCard) -> FollowNet:
+    return GatedFollowNet(_architecture(card, GatedNetConfig), card.preprocess)
+
+
+def _architecture(card: ModelCard, expected: type[_ShapeT]) -> _ShapeT:
+    if not isinstance(card.architecture, expected):
+        raise CheckpointError(f"{CARD}: the architecture is not that of a network of kind {card.kind!r}")
+    return card.architecture
+
+
 ARCHITECTURES: Final[Mapping[str, Callable[[ModelCard], FollowNet]]] = {
-    FollowNet.kind: lambda card: FollowNet(card.architecture, card.preprocess),
+    FollowNet.kind: _plain,
+    GatedFollowNet.kind: _gated,
 }
 """How a network is built from its card, by the card's ``kind``."""
 

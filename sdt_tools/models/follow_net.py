@@ -50,13 +50,16 @@ class FollowNet(nn.Module):
     """
 
     kind: ClassVar[str] = "follow_plain"
+    architecture: Config
+    preprocess: PreprocessConfig
+    layers: nn.Sequential
 
     def __init__(self, architecture: FollowNetConfig, preprocess: PreprocessConfig) -> None:
         super().__init__()
         self.architecture = architecture
         self.preprocess = preprocess
         with torch.random.fork_rng(devices=[]):  # torch draws weights for each layer; nobody else's numbers shall move
-            self.layers = nn.Sequential(_layers(architecture, preprocess))
+            self.layers = nn.Sequential(follow_layers(architecture, preprocess))
 
     def forward(self, ranges_m: Float[Tensor, "batch rays"]) -> Float[Tensor, "batch classes"]:
         """The logits, in the order of ``MotionClass``."""
@@ -65,24 +68,30 @@ class FollowNet(nn.Module):
 
 
 def new_follow_net(architecture: FollowNetConfig, preprocess: PreprocessConfig, seed: int) -> FollowNet:
-    """A network with random weights that depend on ``seed`` alone.
+    """A network with random weights that depend on ``seed`` alone."""
+    network = FollowNet(architecture, preprocess)
+    draw_weights(network, seed)
+    return network
+
+
+def draw_weights(network: FollowNet, seed: int) -> None:
+    """Give ``network`` new random weights that depend on ``seed`` alone.
 
     Weights and biases are uniform within ±1/√(inputs of a neuron). That is less than what keeps the signal's size from
     layer to layer (He's initialisation), and it generalises better from a few thousand scans.
     """
-    network = FollowNet(architecture, preprocess)
     generator = torch.Generator().manual_seed(seed)
-    for layer in network.layers:
+    for layer in network.layers.modules():
         if isinstance(layer, nn.Conv1d | nn.Linear):
             bound = layer.weight[0].numel() ** -0.5
             for parameter in layer.parameters():
                 nn.init.uniform_(parameter, -bound, bound, generator=generator)
-    return network
 
 
-def _layers(architecture: FollowNetConfig, preprocess: PreprocessConfig) -> "OrderedDict[str, nn.Module]":
+def follow_layers(architecture: FollowNetConfig, preprocess: PreprocessConfig) -> "OrderedDict[str, nn.Module]":
+    """The layers of a plain network by name, in order."""
     layers: OrderedDict[str, nn.Module] = OrderedDict(
-        clip_scale=ClipScale(preprocess.clip_m), channel=nn.Unflatten(1, (1, RAYS))
+        clip_scale=ClipScale(preprocess.clip_m, preprocess.scale_m), channel=nn.Unflatten(1, (1, RAYS))
     )
     channels, length = 1, RAYS
     shapes = zip(architecture.kernels, architecture.widths, architecture.strides, strict=True)

@@ -47,12 +47,13 @@ class PreprocessConfig(Config):
     ``code_below_m``: readings below it are codes (the LMS1xx's are 0, 2 and 3 mm), and so are readings that are not
     finite. ``code_policy``: ``interpolate`` linearly between the valid neighbours along the scan (at its ends, the
     nearest valid ray), ``max_range`` (free space) or ``near`` (an object at 0 m). ``clip_m``: ranges beyond it are
-    taken for it.
+    taken for it. ``scale_m``: the range that becomes 1, where 0 becomes -1; without it, ``clip_m``.
     """
 
     code_below_m: float = Field(default=0.005, ge=0.0, le=0.1)
     code_policy: CodePolicy = "interpolate"
     clip_m: float = Field(default=4.0, gt=0.0, le=MAX_RANGE_M)
+    scale_m: float | None = Field(default=None, gt=0.0)
 
 
 def resolve_codes(
@@ -84,15 +85,19 @@ def invalid_front_share(
 
 
 class ClipScale(nn.Module):
-    """Ranges in metres, clipped to [0, ``clip_m``] and scaled to [-1, 1]; monotone, so that bounds pass exactly."""
+    """Ranges in metres, clipped to [0, ``clip_m``] and scaled so that 0 becomes -1 and ``scale_m`` becomes 1.
 
-    def __init__(self, clip_m: float) -> None:
+    Monotone, so that bounds pass exactly. ``scale_m`` is ``clip_m`` where it is not given.
+    """
+
+    def __init__(self, clip_m: float, scale_m: float | None = None) -> None:
         super().__init__()
         self.clip_m = clip_m
+        self.scale_m = clip_m if scale_m is None else scale_m
 
     def forward(self, ranges_m: Float[Tensor, "batch rays"]) -> Float[Tensor, "batch rays"]:
         """The scaled ranges."""
-        return torch.clamp(ranges_m, 0.0, self.clip_m) * (2.0 / self.clip_m) - 1.0
+        return torch.clamp(ranges_m, 0.0, self.clip_m) * (2.0 / self.scale_m) - 1.0
 
 
 @njit(cache=True)

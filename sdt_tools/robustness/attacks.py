@@ -19,9 +19,8 @@ from torch import Tensor, nn
 from sdt_tools.config import Config
 from sdt_tools.frames import MotionClass
 from sdt_tools.models.loaded import one_torch_thread
-from sdt_tools.models.preprocess import ClipScale
 from sdt_tools.robustness.boxes import DomainSet
-from sdt_tools.robustness.intervals import split_classes
+from sdt_tools.robustness.intervals import seen_box, split_classes
 
 _Network = TypeVar("_Network", bound=nn.Module)
 
@@ -57,7 +56,7 @@ class AttackResult:
 def attack(network: nn.Module, boxes: DomainSet, config: AttackConfig) -> AttackResult:
     """Search every box of a set, on one thread. ``network`` maps ranges in metres to logits, and is left as it is."""
     climber, judge = _frozen(network).float(), _frozen(network).double()
-    lower_m, upper_m = _search_box(network, boxes)
+    lower_m, upper_m = seen_box(network, boxes)
     worst_m = (lower_m + upper_m) / 2
     violation = np.full(len(boxes), -np.inf)
     with one_torch_thread():
@@ -74,17 +73,6 @@ def attack(network: nn.Module, boxes: DomainSet, config: AttackConfig) -> Attack
 
 def _frozen(network: _Network) -> _Network:
     return deepcopy(network).eval().requires_grad_(False)
-
-
-def _search_box(
-    network: nn.Module, boxes: DomainSet
-) -> tuple[Float64[np.ndarray, "domains rays"], Float64[np.ndarray, "domains rays"]]:
-    """The part of each box where its scans differ to the network.
-
-    Beyond the range at which a network clips, all scans are one and no gradient leads back.
-    """
-    clip_m = max((layer.clip_m for layer in network.modules() if isinstance(layer, ClipScale)), default=np.inf)
-    return boxes.lower_m, np.maximum(boxes.lower_m, np.minimum(boxes.upper_m, clip_m))
 
 
 def _starts(

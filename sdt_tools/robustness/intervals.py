@@ -1,8 +1,9 @@
 """Interval bound propagation: what a network can answer, at worst, to all scans of a box.
 
 Bounds go through the layers one by one. A layer that is monotone takes the two ends of an interval; one that is affine
-takes its centre and radius, the radius by the absolute weights. The last layer is elided: what is bounded is the
-difference of two logits over its inputs, which is tighter than the difference of two bounded logits.
+takes its centre and radius, the radius by the absolute weights. A last layer that is affine is elided: what is bounded
+is the difference of two logits over its inputs, which is tighter than the difference of two bounded logits. Branches
+that are added at the end are bounded one by one.
 
 Bounds hold in exact arithmetic. Rounding adds an error of the size of the precision times the activations, so whoever
 certifies computes in float64 (``domain_differences``) and asks for a margin.
@@ -23,6 +24,7 @@ from torch.nn import functional
 from sdt_tools.errors import CheckpointError
 from sdt_tools.frames import MotionClass
 from sdt_tools.models.follow_net import FollowNet
+from sdt_tools.models.layers import MaxOverRays, Rays, SoftClip, SumOfBranches
 from sdt_tools.models.loaded import one_torch_thread
 from sdt_tools.models.preprocess import ClipScale
 from sdt_tools.robustness.boxes import DomainSet
@@ -34,8 +36,8 @@ of much larger weights loses more, and needs its own."""
 _BOXES_AT_ONCE: Final = 40
 """The activations of much larger batches leave the processor's cache."""
 
-_MONOTONE: Final = (ClipScale, nn.ReLU)
-_RESHAPING: Final = (nn.Unflatten, nn.Flatten)
+_MONOTONE: Final = (ClipScale, nn.ReLU, SoftClip, MaxOverRays)
+_RESHAPING: Final = (nn.Unflatten, nn.Flatten, Rays)
 _SILENT: Final = (nn.Dropout, nn.Identity)
 
 _Bounds = tuple[Tensor, Tensor]
@@ -52,11 +54,7 @@ def difference_bounds(
     Boxes are in metres and in the precision of the weights. Gradients flow to the weights (and to the boxes).
     Raises CheckpointError for layers that bounds cannot pass.
     """
-    *inner, last = _named(layers)
-    bounds = (lower_m, upper_m)
-    for name, layer in inner:
-        bounds = _through(name, layer, bounds)
-    return _elided(*last, bounds, allowed)
+    return _differences(layers, (lower_m, upper_m), allowed)
 
 
 def worst_case_loss(differences: Float[Tensor, "boxes allowed forbidden"]) -> Float[Tensor, "boxes"]:
@@ -104,11 +102,36 @@ def split_classes(allowed: frozenset[MotionClass]) -> tuple[list[int], list[int]
     ]
 
 
+def seen_box(
+    network: nn.Module, boxes: DomainSet
+) -> tuple[Float64[np.ndarray, "domains rays"], Float64[np.ndarray, "domains rays"]]:
+    """Lower and upper bounds of the part of each box where its scans differ to the network.
+
+    Beyond the range at which a network clips, all scans are one and no gradient leads back.
+    """
+    clip_m = max((layer.clip_m for layer in network.modules() if isinstance(layer, ClipScale)), default=np.inf)
+    return boxes.lower_m, np.maximum(boxes.lower_m, np.minimum(boxes.upper_m, clip_m))
+
+
 def _named(layers: nn.Sequential) -> Sequence[tuple[str, nn.Module]]:
     named = list(layers.named_children())
     if not named:
         raise CheckpointError("the network has no layers, so there is nothing to bound")
     return named
+
+
+def _differences(layers: nn.Sequential, bounds: _Bounds, allowed: frozenset[MotionClass]) -> Tensor:
+    """Differences of logits after ``layers``: of a sum, the sum of its branches' differences."""
+    *inner, (name, last) = _named(layers)
+    for inner_name, layer in inner:
+        bounds = _through(inner_name, layer, bounds)
+    if isinstance(last, SumOfBranches):
+        return torch.stack([_differences(branch, bounds, allowed) for branch in last.parts()]).sum(dim=0)
+    if isinstance(last, SoftClip):
+        lower, upper = _through(name, last, bounds)
+        kept, forbidden = split_classes(allowed)
+        return lower[:, kept].unsqueeze(2) - upper[:, forbidden].unsqueeze(1)
+    return _elided(name, last, bounds, allowed)
 
 
 def _through(name: str, layer: nn.Module, bounds: _Bounds) -> _Bounds:
@@ -122,7 +145,7 @@ def _through(name: str, layer: nn.Module, bounds: _Bounds) -> _Bounds:
         return centre - radius, centre + radius
     raise CheckpointError(
         f"layer '{name}' is a {type(layer).__name__}, through which no bounds can be propagated; "
-        "use Conv1d, Linear, ReLU, Dropout, Flatten, Unflatten and ClipScale"
+        "use Conv1d, Linear, ReLU, Dropout, Flatten, Unflatten and the layers of sdt_tools.models"
     )
 
 

@@ -16,6 +16,8 @@ from sdt_tools.errors import ConfigError
 from sdt_tools.frames import Gesture, Pose2D
 from sdt_tools.scene.layout import Box, GestureEvent, Layout, OperatorPlan, Post, Wall
 from sdt_tools.scene.practice import PRACTICE_FAMILIES, practice_layout
+from sdt_tools.scene.practice_courses import NAME as PRACTICE_COURSE
+from sdt_tools.scene.practice_courses import course_layout
 from sdt_tools.scene.seeds import Stream, generator
 from sdt_tools.scene.validity import check_layout
 
@@ -163,7 +165,7 @@ def load_scenario(name_or_path: str) -> Scenario:
     known = scenario_names()
     if name_or_path in known:
         return load_config(Scenario, _FOLDER / f"{name_or_path}.toml")
-    everything = [*known, *PRACTICE_FAMILIES]
+    everything = [*known, *PRACTICE_FAMILIES, PRACTICE_COURSE]
     near = difflib.get_close_matches(name_or_path, everything, n=1)
     hint = f"did you mean '{near[0]}'? " if near else ""
     raise ConfigError(f"unknown scenario '{name_or_path}'; {hint}There are {', '.join(everything)}, or a file *.toml")
@@ -175,6 +177,8 @@ def layout_for(name_or_path: str, seed: int) -> Layout:
         raise ConfigError(f"seed {seed}: seeds are 0 or greater")
     if name_or_path in PRACTICE_FAMILIES:
         return practice_layout(seed, PRACTICE_FAMILIES[name_or_path])
+    if name_or_path == PRACTICE_COURSE:
+        return course_layout(seed)
     return draw(load_scenario(name_or_path), seed)
 
 

@@ -13,6 +13,7 @@ class Stream(IntEnum):
     SENSOR = 2
     CAMERA = 3
     TOO_CLOSE = 4
+    COURSE = 5
 
 
 def generator(seed: int, stream: Stream) -> np.random.Generator:

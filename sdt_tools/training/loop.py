@@ -1,10 +1,10 @@
-"""The one training loop: every training runs through it, with or without a safety term.
+"""The one training loop: every training runs through it, with or without safety domains.
 
-A step minimises the cross-entropy of a batch plus, where one is given, a safety term: Algorithm 1 of the paper.
-Training without safety domains is the case without a term.
+With them it is Algorithm 1 of the paper: a step goes down the loss of a batch of data plus that of a batch of domains.
+As printed, the algorithm ends when the least number of epochs is done *or* the safety bound is at most δ; here it ends
+when both hold, or when no epochs are left. Training without domains is the case without a safety term.
 """
 
-import copy
 import math
 import time
 from collections.abc import Callable, Iterator
@@ -19,14 +19,22 @@ from torch.nn import functional
 
 from sdt_tools.config import Config
 from sdt_tools.errors import RunError
+from sdt_tools.frames import FORWARD_CLASSES
 from sdt_tools.models.loaded import one_torch_thread
+from sdt_tools.training.record import EpochRecord
+from sdt_tools.training.safety import SafetyRecord
 from sdt_tools.training.schedule import LearningRateConfig, learning_rate
+from sdt_tools.training.snapshot import SnapshotFile
 
 
 class LoopConfig(Config):
-    """How long and how carefully: Adam with decoupled weight decay, its steps bounded by ``gradient_norm``."""
+    """How long and how carefully: Adam with decoupled weight decay, its steps bounded by ``gradient_norm``.
+
+    ``epochs`` are always done; up to ``extra_epochs`` follow while the safety bound is above δ.
+    """
 
     epochs: int = Field(default=80, ge=1)
+    extra_epochs: int = Field(default=40, ge=0)
     learning_rate: LearningRateConfig = LearningRateConfig()
     weight_decay: float = Field(default=0.05, ge=0.0)
     label_smoothing: float = Field(default=0.1, ge=0.0, lt=1.0)
@@ -43,49 +51,49 @@ class Batch:
 
 @runtime_checkable
 class Batches(Protocol):
-    """One epoch of batches after the other."""
+    """Training data in batches."""
 
     def __len__(self) -> int:
         """Batches in an epoch."""
         ...
 
-    def __iter__(self) -> Iterator[Batch]:
-        """The next epoch."""
+    def epoch(self, number: int) -> Iterator[Batch]:
+        """The batches of epoch ``number``, which depend on nothing drawn before."""
         ...
 
 
 @runtime_checkable
-class SafetyTerm(Protocol):
-    """What is added to the loss of a step, λ included."""
+class Safety(Protocol):
+    """Safety domains as the loop sees them."""
 
-    def __call__(self, network: nn.Module, progress: float) -> Float[Tensor, ""]:
-        """The term for ``network`` when the share ``progress`` of all steps is done."""
+    @property
+    def clean_weight(self) -> float:
+        """What the loss on the data counts."""
+        ...
+
+    def begin(self, epoch: int) -> None:
+        """Make the draws of ``epoch``, whatever was drawn before."""
+        ...
+
+    def loss(self, progress: float) -> Float[Tensor, ""]:
+        """What is added to the loss of a step, λ included, when the share ``progress`` of the planned steps is done."""
+        ...
+
+    def measure(self) -> SafetyRecord:
+        """How the network stands to its domains."""
+        ...
+
+    def satisfied(self, record: SafetyRecord) -> bool:
+        """Whether training may end."""
         ...
 
 
 @dataclass(frozen=True)
-class EpochRecord:
-    """One epoch: means over its batches as they were trained on (varied, with dropout), and the validation after it.
-
-    Both losses are plain cross-entropies, without label smoothing and safety term.
-    """
-
-    epoch: int
-    learning_rate: float
-    train_loss: float
-    train_accuracy: float
-    val_loss: float
-    val_accuracy: float
-    seconds: float
-
-
-@dataclass(frozen=True)
 class LoopResult:
-    """``kept_epoch`` is the epoch whose weights the network has now: the last, or the best where it was interrupted."""
+    """The epochs, and whether the safety bound is at most δ; None where there are no domains."""
 
     history: tuple[EpochRecord, ...]
-    kept_epoch: int
-    interrupted: bool
+    satisfied: bool | None
 
 
 def run_loop(
@@ -95,62 +103,90 @@ def run_loop(
     config: LoopConfig,
     seed: int,
     on_epoch: Callable[[EpochRecord], None],
-    safety_term: SafetyTerm | None = None,
+    safety: Safety | None = None,
+    snapshot: SnapshotFile | None = None,
 ) -> LoopResult:
     """Train ``network`` in place, on one thread; the same inputs give the same weights on the same machine.
 
     The weights of the last epoch stand: the learning rate has run out by then, and choosing an epoch by its validation
-    accuracy would make that accuracy too good to be true. When interrupted (KeyboardInterrupt) after a whole epoch, the
-    best epoch on validation so far is kept, and the result says so; before that, the interruption is passed on.
+    accuracy would make that accuracy too good to be true. With a ``snapshot``, the state is kept after each epoch, and
+    a training that was interrupted goes on from there to the same weights.
     Raises RunError when the loss is no longer finite.
     """
     optimizer = torch.optim.AdamW(
         network.parameters(), lr=config.learning_rate.peak, weight_decay=config.weight_decay, foreach=True
     )
-    history: list[EpochRecord] = []
-    best_weights: dict[str, Tensor] = {}
-    best = -math.inf
+    history = snapshot.restore(network, optimizer) if snapshot else []
+    satisfied: bool | None = None
     with one_torch_thread(), torch.random.fork_rng(devices=[]):
-        torch.manual_seed(seed)
         try:
-            for epoch in range(1, config.epochs + 1):
-                record = _train_epoch(network, batches, validation, config, optimizer, epoch, safety_term)
+            for epoch in range(len(history) + 1, config.epochs + config.extra_epochs + 1):
+                if epoch > config.epochs and satisfied is not False:
+                    break
+                torch.manual_seed(1_000_003 * seed + epoch)
+                record, satisfied = _epoch(network, batches, validation, config, optimizer, epoch, safety)
                 history.append(record)
-                if record.val_accuracy > best:
-                    best, best_weights = record.val_accuracy, copy.deepcopy(network.state_dict())
+                if snapshot:
+                    snapshot.save(network, optimizer, history)
                 on_epoch(record)
-        except KeyboardInterrupt:
-            if not history:
-                raise
-            network.load_state_dict(best_weights)
-            kept = max(history, key=lambda record: record.val_accuracy)
-            return LoopResult(tuple(history), kept.epoch, interrupted=True)
         finally:
             network.eval()
-    return LoopResult(tuple(history), len(history), interrupted=False)
+    return LoopResult(tuple(history), satisfied)
 
 
-def _train_epoch(
+def _epoch(
     network: nn.Module,
     batches: Batches,
     validation: Batch,
     config: LoopConfig,
     optimizer: torch.optim.Optimizer,
     epoch: int,
-    safety_term: SafetyTerm | None,
-) -> EpochRecord:
+    safety: Safety | None,
+) -> tuple[EpochRecord, bool | None]:
+    """Train for one epoch and look at what it brought; with domains, say whether they are satisfied."""
     started = time.monotonic()
+    rate, loss, accuracy = _descend(network, batches, config, optimizer, epoch, safety)
+    if not math.isfinite(loss):
+        raise RunError(f"training diverged in epoch {epoch}: the loss is not finite; lower learning_rate.peak")
+    network.eval()
+    val_loss, val_accuracy, val_forward_recall = _validate(network, validation)
+    safe = safety.measure() if safety else None
+    record = EpochRecord(
+        epoch=epoch,
+        learning_rate=rate,
+        train_loss=loss,
+        train_accuracy=accuracy,
+        val_loss=val_loss,
+        val_accuracy=val_accuracy,
+        val_forward_recall=val_forward_recall,
+        seconds=time.monotonic() - started,
+        **(vars(safe) if safe else {}),
+    )
+    return record, safety.satisfied(safe) if safety and safe else None
+
+
+def _descend(
+    network: nn.Module,
+    batches: Batches,
+    config: LoopConfig,
+    optimizer: torch.optim.Optimizer,
+    epoch: int,
+    safety: Safety | None,
+) -> tuple[float, float, float]:
+    """The steps of one epoch: the last learning rate, and loss and accuracy on the data."""
     network.train()
+    if safety:
+        safety.begin(epoch)
     total_loss, correct, frames, rate = 0.0, 0, 0, 0.0
-    for place, batch in enumerate(batches):
+    for place, batch in enumerate(batches.epoch(epoch)):
         progress = (epoch - 1 + place / len(batches)) / config.epochs
         rate = learning_rate(config.learning_rate, progress)
         for group in optimizer.param_groups:
             group["lr"] = rate
         logits = network(batch.ranges_m)
         loss = functional.cross_entropy(logits, batch.labels, label_smoothing=config.label_smoothing)
-        if safety_term is not None:
-            loss = loss + safety_term(network, progress)
+        if safety:
+            loss = safety.clean_weight * loss + safety.loss(progress)
         optimizer.zero_grad()
         torch.autograd.backward(loss)
         nn.utils.clip_grad_norm_(network.parameters(), config.gradient_norm)
@@ -159,16 +195,16 @@ def _train_epoch(
         total_loss += float(functional.cross_entropy(logits.detach(), batch.labels)) * size
         correct += int((logits.argmax(1) == batch.labels).sum())
         frames += size
-    if not math.isfinite(total_loss):
-        raise RunError(f"training diverged in epoch {epoch}: the loss is not finite; lower learning_rate.peak")
-    val_loss, val_accuracy = _validate(network, validation)
-    seconds = time.monotonic() - started
-    return EpochRecord(epoch, rate, total_loss / frames, correct / frames, val_loss, val_accuracy, seconds)
+    return rate, total_loss / frames, correct / frames
 
 
-def _validate(network: nn.Module, validation: Batch) -> tuple[float, float]:
-    network.eval()
+def _validate(network: nn.Module, validation: Batch) -> tuple[float, float, float]:
+    """Loss, accuracy, and forward recall, which is NaN where no frame has a forward label."""
+    forward = torch.tensor([int(motion) for motion in sorted(FORWARD_CLASSES)])
     with torch.inference_mode():
         logits = network(validation.ranges_m)
         loss = functional.cross_entropy(logits, validation.labels)
-    return float(loss), float((logits.argmax(1) == validation.labels).float().mean())
+        answers = logits.argmax(1)
+        due = torch.isin(validation.labels, forward)
+        recall = torch.isin(answers[due], forward).float().mean()
+    return float(loss), float((answers == validation.labels).float().mean()), float(recall)

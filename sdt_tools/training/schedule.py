@@ -9,11 +9,15 @@ from sdt_tools.config import Config
 
 
 class LearningRateConfig(Config):
-    """A linear warm-up to ``peak``, a plateau, and a half cosine down to 0; the shares are of all steps."""
+    """A linear warm-up to ``peak``, a plateau, and a half cosine down to 0; the shares are of the planned steps.
+
+    Epochs beyond the planned ones go on with ``extra_share`` of the peak.
+    """
 
     peak: float = Field(default=2e-3, gt=0.0)
     warm_up_share: float = Field(default=0.05, ge=0.0, le=1.0)
     decay_share: float = Field(default=0.4, ge=0.0, le=1.0)
+    extra_share: float = Field(default=0.1, ge=0.0, le=1.0)
 
     @model_validator(mode="after")
     def _fits(self) -> "LearningRateConfig":
@@ -27,7 +31,9 @@ _FIRST: Final = 1e-3
 
 
 def learning_rate(config: LearningRateConfig, progress: float) -> float:
-    """The rate when the share ``progress`` of all steps, in [0, 1), is done."""
+    """The rate when the share ``progress`` of the planned steps is done."""
+    if progress >= 1.0:
+        return config.peak * config.extra_share
     if progress < config.warm_up_share:
         return config.peak * max(progress / config.warm_up_share, _FIRST)
     until_end = 1.0 - progress

@@ -123,7 +123,7 @@ def test_a_broken_card_is_refused(folder: Path) -> None:
 
 def test_another_kind_of_network_is_refused(folder: Path) -> None:
     rewrite_card(folder, '"follow_plain"', '"vision_resnet"')
-    assert "of kind 'vision_resnet'; this version knows follow_plain" in refusal(folder)
+    assert "of kind 'vision_resnet'; this version knows follow_gate, follow_plain" in refusal(folder)
 
 
 def test_another_format_is_refused(folder: Path) -> None:

@@ -76,20 +76,44 @@ def test_arguments_are_left_as_they_were() -> None:
 def test_an_epoch_shows_each_frame_once_but_for_the_rest() -> None:
     scans = np.arange(1, 71, dtype=np.float32)[:, None] / 10 + np.zeros((70, 541), np.float32)
     batches = VariedBatches(scans, np.zeros(70, np.int64), 16, NOTHING, PreprocessConfig(), seed=0)
-    first, second = ([batch.ranges_m[:, 0].tolist() for batch in batches] for _ in range(2))
+    first, second = ([batch.ranges_m[:, 0].tolist() for batch in batches.epoch(number)] for number in (1, 2))
     assert len(batches) == len(first) == 4
     assert len({value for batch in first for value in batch}) == 64
     assert first != second
+
+
+def test_an_epoch_is_the_same_whatever_came_before() -> None:
+    scans, labels = frames()
+    batches = VariedBatches(scans, labels, 16, AugmentConfig(noise_m=0.1), PreprocessConfig(), seed=0)
+    list(batches.epoch(1))
+    again, fresh = (
+        [batch.ranges_m for batch in these.epoch(5)]
+        for these in (batches, VariedBatches(scans, labels, 16, AugmentConfig(noise_m=0.1), PreprocessConfig(), seed=0))
+    )
+    assert all((one == other).all() for one, other in zip(again, fresh, strict=True))
+
+
+def test_near_misses_bring_one_front_ray_near_where_the_way_is_free_and_the_label_forward() -> None:
+    scans = np.full((4, 541), 3.0, np.float32)
+    scans[1, 200] = 0.22  # not clear
+    labels = np.array([MotionClass.FORWARD, MotionClass.FORWARD, MotionClass.STAY, MotionClass.RIGHT_FORWARD])
+    config = AugmentConfig(mirror=False, near_miss_share=1.0)
+    varied, kept = augment(scans, labels, config, np.random.default_rng(0))
+    assert ((varied != scans).sum(axis=1) == [1, 0, 0, 1]).all()
+    rays, values = np.nonzero(varied != scans)[1], varied[varied != scans]
+    assert ((rays >= 150) & (rays <= 389)).all()
+    assert ((values >= 0.26) & (values <= 0.54)).all()
+    np.testing.assert_array_equal(kept, labels)
 
 
 def test_batches_have_their_codes_resolved() -> None:
     scans, labels = frames()
     batches = VariedBatches(scans, labels, 64, NOTHING, PreprocessConfig(), seed=0)
     assert (scans == 0).any()
-    assert all(float(batch.ranges_m.min()) > 0.1 for batch in batches)
+    assert all(float(batch.ranges_m.min()) > 0.1 for batch in batches.epoch(1))
 
 
 def test_a_batch_larger_than_the_data_is_the_data() -> None:
     scans, labels = frames(10)
     batches = VariedBatches(scans, labels, 64, NOTHING, PreprocessConfig(), seed=0)
-    assert [len(batch.labels) for batch in batches] == [10]
+    assert [len(batch.labels) for batch in batches.epoch(1)] == [10]

@@ -13,12 +13,25 @@ from sdt_tools.config import load_config
 from sdt_tools.errors import ConfigError, DatasetError, OutputExistsError, RunError
 from sdt_tools.models.checkpoint import load_checkpoint
 from sdt_tools.models.follow_net import FollowNetConfig
-from sdt_tools.training.follow import FollowTrainingConfig, train_follow
-from sdt_tools.training.loop import EpochRecord, LoopConfig
+from sdt_tools.robustness.domains import SafetyLevel, domains
+from sdt_tools.robustness.intervals import domain_differences, worst_margins
+from sdt_tools.training.augment import AugmentConfig
+from sdt_tools.training.follow import FollowTrainingConfig, train_follow, unfinished
+from sdt_tools.training.loop import LoopConfig
+from sdt_tools.training.record import EpochRecord
+from sdt_tools.training.safety import SafetyConfig
 from sdt_tools.training.schedule import LearningRateConfig
+from sdt_tools.training.specification import SpecificationConfig
 
 SMALL = FollowNetConfig(kernels=(9, 5, 3), widths=(8, 16, 16), strides=(4, 4, 2), hidden=24, dropout=0.1)
 BRIEF = FollowTrainingConfig(architecture=SMALL, loop=LoopConfig(epochs=2))
+SAFE = FollowTrainingConfig(
+    arch="gate",
+    architecture=SMALL,
+    specification=SpecificationConfig(level=4),
+    loop=LoopConfig(epochs=2, extra_epochs=0),
+    safety=SafetyConfig(start_share=0.25, ramp_share=0.25),
+)
 
 
 @pytest.fixture(scope="module")
@@ -79,22 +92,51 @@ def test_the_learning_curve_is_a_table_and_a_picture(dataset: Path, tmp_path: Pa
     assert imread(tmp_path / "model" / "curve.png").std() > 0.01
 
 
-def test_interrupted_training_keeps_the_best_epoch(dataset: Path, tmp_path: Path) -> None:
-    records: list[EpochRecord] = []
+class Stop:
+    """Interrupts after an epoch."""
 
-    def interrupt(record: EpochRecord, epochs: int) -> None:
-        records.append(record)
-        if record.epoch == 4:
+    def __init__(self, epoch: int) -> None:
+        self.epoch = epoch
+        self.seen: list[int] = []
+
+    def __call__(self, record: EpochRecord, epochs: int) -> None:
+        self.seen.append(record.epoch)
+        if record.epoch == self.epoch:
             raise KeyboardInterrupt
 
-    steep = LearningRateConfig(peak=0.03, warm_up_share=0.0, decay_share=0.0)
-    config = BRIEF.model_copy(update={"loop": LoopConfig(epochs=50, learning_rate=steep)})
-    summary = train_follow(dataset, config, tmp_path / "model", interrupt)
-    best = max(records, key=lambda record: record.val_accuracy)
-    assert summary.interrupted
-    assert (summary.epochs, summary.kept_epoch) == (4, best.epoch)
-    assert summary.val.accuracy == pytest.approx(best.val_accuracy)
-    assert load_checkpoint(tmp_path / "model").card.metrics["interrupted"] is True
+
+@pytest.mark.parametrize("config", [BRIEF, SAFE], ids=["without domains", "with domains"])
+def test_an_interrupted_training_goes_on_to_the_same_weights(
+    config: FollowTrainingConfig, dataset: Path, tmp_path: Path
+) -> None:
+    longer = config.model_copy(update={"loop": config.loop.model_copy(update={"epochs": 4})})
+    straight = train_follow(dataset, longer, tmp_path / "straight")
+    with pytest.raises(KeyboardInterrupt):
+        train_follow(dataset, longer, tmp_path / "model", Stop(2))
+    assert not (tmp_path / "model").exists()
+    rest = Stop(99)
+    resumed = train_follow(dataset, longer, tmp_path / "model", rest)
+    assert rest.seen == [3, 4]
+    assert resumed.val.accuracy == straight.val.accuracy
+    one, other = weights(tmp_path / "straight"), weights(tmp_path / "model")
+    assert all(torch.equal(one[name], other[name]) for name in one)
+    curves = [(tmp_path / name / "curve.csv").read_text().splitlines() for name in ("straight", "model")]
+    assert [len(curve) for curve in curves] == [5, 5]
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["model", "straight"]
+
+
+def test_a_training_of_other_settings_is_not_gone_on_with(dataset: Path, tmp_path: Path) -> None:
+    with pytest.raises(KeyboardInterrupt):
+        train_follow(dataset, BRIEF, tmp_path / "model", Stop(1))
+    other = BRIEF.model_copy(update={"seed": 5, "batch_size": 32})
+    with pytest.raises(ConfigError, match=r"model\.unfinished.*batch_size 64 to 32, seed 0 to 5.*or delete it"):
+        train_follow(dataset, other, tmp_path / "model")
+
+
+def test_a_damaged_state_is_named(dataset: Path, tmp_path: Path) -> None:
+    unfinished(tmp_path / "model").write_bytes(b"\x08" + bytes(7) + b"nonsense")
+    with pytest.raises(RunError, match=r"unfinished.*damaged.*delete it to begin anew"):
+        train_follow(dataset, BRIEF, tmp_path / "model")
 
 
 def test_interruption_before_the_first_epoch_leaves_nothing(
@@ -103,7 +145,7 @@ def test_interruption_before_the_first_epoch_leaves_nothing(
     def interrupt(*arguments: object) -> None:
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("sdt_tools.training.loop._train_epoch", interrupt)
+    monkeypatch.setattr("sdt_tools.training.loop._epoch", interrupt)
     with pytest.raises(KeyboardInterrupt):
         train_follow(dataset, BRIEF, tmp_path / "model")
     assert list(tmp_path.iterdir()) == []
@@ -132,3 +174,28 @@ def test_an_unknown_key_of_the_configuration_is_named(tmp_path: Path) -> None:
     path.write_text("[loop.learning_rate]\npaek = 2e-3\n")
     with pytest.raises(ConfigError, match=r"unknown key 'loop\.learning_rate\.paek'; did you mean 'peak'\?"):
         load_config(FollowTrainingConfig, path)
+
+
+def test_a_gated_network_is_certified_and_still_answers(dataset: Path, tmp_path: Path) -> None:
+    """Level 4 on the small problem, whose near objects stand outside every domain."""
+    config = SAFE.model_copy(
+        update={
+            "batch_size": 32,
+            "augment": AugmentConfig(near_miss_share=0.5),
+            "loop": LoopConfig(epochs=16, learning_rate=LearningRateConfig(peak=1e-2)),
+            "safety": SafetyConfig(weight=0.3, start_share=0.4, ramp_share=0.2),
+        }
+    )
+    summary = train_follow(dataset, config, tmp_path / "model")
+    assert summary.satisfied is True
+    assert summary.last.certified_share == 1.0
+    assert summary.val.accuracy > 0.9
+    network = load_checkpoint(tmp_path / "model").network
+    assert (worst_margins(torch.from_numpy(domain_differences(network, domains(SafetyLevel.FOUR)))) > 0).all()
+
+
+def test_a_bound_that_is_not_reached_is_told_and_the_checkpoint_kept(dataset: Path, tmp_path: Path) -> None:
+    hopeless = SAFE.model_copy(update={"safety": SafetyConfig(delta=1e-9, start_share=0.9), "arch": "plain"})
+    summary = train_follow(dataset, hopeless, tmp_path / "model")
+    assert summary.satisfied is False
+    assert load_checkpoint(tmp_path / "model").card.metrics["satisfied"] is False

@@ -42,7 +42,7 @@ def test_json_is_one_document_and_options_go_before_the_file(dataset: Path, conf
     out = tmp_path / "model"
     document = json.loads(run(dataset, "--out", out, "--config", config, "--epochs", 1, "--seed", 5, "--json"))
     assert document["checkpoint"] == str(out)
-    assert (document["epochs"], document["kept_epoch"], document["interrupted"]) == (1, 1, False)
+    assert (document["epochs"], document["satisfied"], document["bound"]) == (1, None, None)
     assert document["train_frames"], document["val_frames"] == (140, 70)
     assert 0.0 <= document["val_accuracy"] <= 1.0
     assert "seed = 5" in (out / "model.toml").read_text()
