@@ -13,13 +13,12 @@ import time
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field, fields, is_dataclass
 from enum import Enum
-from functools import cache
 from pathlib import Path
 
 from pydantic import BaseModel
 
-from sdt_tools import __version__
 from sdt_tools.errors import RunError, SdtError
+from sdt_tools.runs.code import code_version
 
 RECORD = "unit.json"
 """The file in a finished folder that says what it was made from."""
@@ -40,9 +39,9 @@ class Unit:
     context: Mapping[str, object] = field(default_factory=dict)
 
     def fingerprint(self) -> str:
-        """SHA-256 over the function's name, the package's code and all arguments."""
+        """SHA-256 over the function's name, the code that it depends on, and all arguments."""
         digest = hashlib.sha256()
-        for part in (self.function.__module__, self.function.__qualname__, code_version()):
+        for part in (self.function.__module__, self.function.__qualname__, code_version(self.function.__module__)):
             digest.update(part.encode() + b"\0")
         for key in sorted(self.arguments):
             digest.update(key.encode() + b"\0")
@@ -77,22 +76,16 @@ def execute(unit: Unit, root: Path) -> Path:
     except Exception as error:
         shutil.rmtree(scratch, ignore_errors=True)
         raise RunError(f"unit '{unit.name}' failed: {type(error).__name__}: {error}") from error
-    record = {"fingerprint": fingerprint, "version": code_version(), "seconds": round(time.monotonic() - started, 3)}
+    record = {
+        "fingerprint": fingerprint,
+        "version": code_version(unit.function.__module__),
+        "seconds": round(time.monotonic() - started, 3),
+    }
     _write_durably(scratch / RECORD, json.dumps(record, indent=2) + "\n")
     if folder.exists():
         shutil.rmtree(folder)
     scratch.rename(folder)
     return folder
-
-
-@cache
-def code_version() -> str:
-    """The package's version and a short hash of its source files, as in ``0.1.0+3f2a9c1b``."""
-    package = Path(__file__).parents[1]
-    digest = hashlib.sha256()
-    for file in sorted([*package.rglob("*.py"), *package.rglob("*.toml")]):
-        digest.update(str(file.relative_to(package)).encode() + b"\0" + file.read_bytes())
-    return f"{__version__}+{digest.hexdigest()[:8]}"
 
 
 def content_hash(path: Path) -> str:

@@ -53,7 +53,7 @@ def _attempt(rng: np.random.Generator, seed: int) -> Layout | None:
     """One draw; None if its elements stand in each other's way."""
     first: tuple[_Draw, ...] = (_start_ahead, _start_ahead, _start_ahead, _start_cornered, _start_garage)
     later: tuple[_Draw, ...] = (_open, _gate, _hall, _slalom, _table, _posts, _bend)
-    weights = (0.15, 0.2, 0.2, 0.18, 0.15, 0.06, 0.06)
+    weights = (0.1, 0.24, 0.3, 0.15, 0.13, 0.04, 0.04)
     elements = [first[rng.integers(len(first))](rng)]
     for _ in range(int(rng.integers(1, 4))):
         elements += [_open(rng)] if rng.random() < 0.5 else []
@@ -207,8 +207,8 @@ def _bend(rng: np.random.Generator) -> _Element:
 
 def _after_narrow(rng: np.random.Generator, x: float, wings: float) -> tuple[tuple[Point, ...], float]:
     """How the way goes on behind a gate or a hall that ends at ``x``: straight for a while, then aside or on."""
-    out = (x + rng.uniform(0.45, 0.9), rng.normal(0.0, 0.05))
-    turn = rng.choice([0.0, rng.choice([-1.0, 1.0]) * rng.uniform(0.5, 1.5)])
+    out = (x + rng.uniform(0.3, 0.8), rng.normal(0.0, 0.05))
+    turn = 0.0 if rng.random() < 0.25 else rng.choice([-1.0, 1.0]) * rng.uniform(0.4, 1.8)
     length = rng.uniform(0.8, max(0.9, min(2.0, wings)))
     return (out, (out[0] + length * math.cos(turn), out[1] + length * math.sin(turn))), turn
 
@@ -220,7 +220,8 @@ def _gate(rng: np.random.Generator) -> _Element:
     start = (0.25 * before, 0.25 * before * math.tan(slant))
     at, y = 0.25 * before + before, start[1] + before * math.tan(slant) * 0.4
     wings = rng.uniform(0.8, 4.0, 2)
-    boxes, walls = [], []
+    boxes: list[Box] = []
+    walls: list[Wall] = []
     for side, wing in zip((-1.0, 1.0), wings, strict=True):
         near = y + side * half
         if thick:
