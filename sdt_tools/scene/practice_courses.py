@@ -195,7 +195,7 @@ def _open(rng: np.random.Generator) -> _Element:
 
 def _bend(rng: np.random.Generator) -> _Element:
     """Somewhere in the open the operator turns round and comes back past the robot."""
-    radius, side = rng.uniform(0.8, 1.4), rng.choice([-1.0, 1.0])
+    radius, side = rng.uniform(0.8, 1.4), _side(rng)
     way = (
         (1.0, 0.0),
         (1.0 + 0.7 * radius, side * 0.5 * radius),
@@ -205,17 +205,22 @@ def _bend(rng: np.random.Generator) -> _Element:
     return _Element(way, math.pi)
 
 
+def _side(rng: np.random.Generator) -> float:
+    """Left or right, as a sign."""
+    return 1.0 if rng.random() < 0.5 else -1.0
+
+
 def _after_narrow(rng: np.random.Generator, x: float, wings: float) -> tuple[tuple[Point, ...], float]:
     """How the way goes on behind a gate or a hall that ends at ``x``: straight for a while, then aside or on."""
     out = (x + rng.uniform(0.3, 0.8), rng.normal(0.0, 0.05))
-    turn = 0.0 if rng.random() < 0.25 else rng.choice([-1.0, 1.0]) * rng.uniform(0.4, 1.8)
+    turn = 0.0 if rng.random() < 0.25 else _side(rng) * rng.uniform(0.4, 1.8)
     length = rng.uniform(0.8, max(0.9, min(2.0, wings)))
     return (out, (out[0] + length * math.cos(turn), out[1] + length * math.sin(turn))), turn
 
 
 def _gate(rng: np.random.Generator) -> _Element:
     """A wall across the way with a gap in it, its jambs thick in half of the cases; the way comes to it aslant."""
-    half, thick = rng.uniform(0.46, 0.75), rng.choice([0.0, rng.uniform(0.08, 0.5)])
+    half, thick = rng.uniform(0.46, 0.75), (0.0 if rng.random() < 0.5 else rng.uniform(0.08, 0.5))
     slant, before = rng.normal(0.0, 0.3), rng.uniform(0.9, 1.6)
     start = (0.25 * before, 0.25 * before * math.tan(slant))
     at, y = 0.25 * before + before, start[1] + before * math.tan(slant) * 0.4
@@ -250,7 +255,7 @@ def _hall(rng: np.random.Generator) -> _Element:
 
 def _slalom(rng: np.random.Generator) -> _Element:
     """Boxes that reach into the way from alternate sides; the way goes round them."""
-    side = rng.choice([-1.0, 1.0])
+    side = _side(rng)
     x = rng.uniform(0.7, 1.2)
     way: list[Point] = []
     boxes: list[Box] = []
@@ -291,7 +296,7 @@ def _posts(rng: np.random.Generator) -> _Element:
     """Some uprights beside the way."""
     length = rng.uniform(1.5, 3.0)
     posts = tuple(
-        Post(rng.uniform(0.3, length), rng.choice([-1.0, 1.0]) * rng.uniform(0.45, 1.2), rng.uniform(0.03, 0.15))
+        Post(rng.uniform(0.3, length), _side(rng) * rng.uniform(0.45, 1.2), rng.uniform(0.03, 0.15))
         for _ in range(int(rng.integers(1, 5)))
     )
     return _Element(((length, rng.normal(0.0, 0.2)),), 0.0, posts=posts)
