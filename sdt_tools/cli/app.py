@@ -13,7 +13,20 @@ from typer.exceptions import TyperException
 from sdt_tools.errors import SdtError
 from sdt_tools.runs.threads import use_one_thread
 
-VERBS = ("demo", "record", "inspect", "import", "label", "dataset", "train", "evaluate", "replay", "errors", "view")
+VERBS = (
+    "demo",
+    "record",
+    "inspect",
+    "import",
+    "label",
+    "dataset",
+    "train",
+    "certify",
+    "evaluate",
+    "replay",
+    "errors",
+    "view",
+)
 """In the order of the flow. Each is a module here (``import_`` for ``import``) with a ``command``, or an ``app``."""
 
 

@@ -14,8 +14,8 @@ from sdt_tools.error_analysis.labelled import load_labelled
 from sdt_tools.error_analysis.recorded import find_recordings, read_situations
 from sdt_tools.error_analysis.report import ErrorReport, summarise, tag_table
 from sdt_tools.errors import OutputExistsError
-from sdt_tools.runs.local import Progress
 from sdt_tools.runs.code import code_version
+from sdt_tools.runs.local import Progress
 from sdt_tools.runs.unit import content_hash
 
 TAGS: Final = "tags.parquet"

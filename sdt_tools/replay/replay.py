@@ -22,8 +22,8 @@ from sdt_tools.recording.reader import Recording
 from sdt_tools.recording.topics import LIDAR_SCAN
 from sdt_tools.replay.predictions import CLASSES_KEY, FORMAT_KEY, FORMAT_VERSION, SCHEMA
 from sdt_tools.replay.rows import CLASSES, NO_LABELS, MotionModel, predict_recording
-from sdt_tools.runs.local import Progress
 from sdt_tools.runs.code import code_version
+from sdt_tools.runs.local import Progress
 from sdt_tools.runs.unit import content_hash
 
 

@@ -78,13 +78,19 @@ def _frozen(network: _Network) -> _Network:
 def _starts(
     lower_m: Float64[np.ndarray, "domains rays"], upper_m: Float64[np.ndarray, "domains rays"], config: AttackConfig
 ) -> Iterator[tuple[Int64[np.ndarray, "ascents"], Float64[np.ndarray, "ascents rays"]]]:
-    """Batches of ascents: the box of each, and a uniformly random scan in it to start from."""
+    """Batches of ascents: the box of each, and a scan in it to start from.
+
+    The first of a box starts at its upper bounds, where a network that takes the nearest ray of all sees most of them
+    far away and has a slope; the others start at uniformly random scans.
+    """
     box, restart = np.divmod(np.arange(len(lower_m) * config.restarts), config.restarts)
     for first in range(0, len(box), config.batch):
         part = slice(first, first + config.batch)
         share = np.array(
             [
                 np.random.default_rng((config.seed, own, number)).random(lower_m.shape[1])
+                if number
+                else np.ones(lower_m.shape[1])
                 for own, number in zip(box[part].tolist(), restart[part].tolist(), strict=True)
             ]
         )

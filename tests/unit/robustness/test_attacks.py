@@ -122,7 +122,7 @@ def test_more_restarts_find_no_less_and_sometimes_more() -> None:
 
     class Hills(nn.Module):
         def forward(self, ranges_m: torch.Tensor) -> torch.Tensor:
-            forward = torch.sin(6.0 * ranges_m[:, 0]) + ranges_m[:, 0]
+            forward = torch.sin(6.0 * ranges_m[:, 0]) - ranges_m[:, 0]
             return torch.stack([torch.zeros_like(forward), forward, *[torch.full_like(forward, -99.0)] * 5], dim=1)
 
     boxes = box_set(np.zeros((20, 1)), np.full((20, 1), 10.0))
@@ -130,7 +130,7 @@ def test_more_restarts_find_no_less_and_sometimes_more() -> None:
     many = attack(Hills(), boxes, AttackConfig(restarts=30, step_share=0.02))
     assert (many.violation >= one.violation).all()
     heights = np.linspace(0.0, 10.0, 100_001)
-    highest = (np.sin(6.0 * heights) + heights).max()
+    highest = (np.sin(6.0 * heights) - heights).max()
     assert many.violation.max() == pytest.approx(highest, abs=0.01)
     assert one.violation.mean() < many.violation.mean() - 1.0
 
