@@ -26,6 +26,7 @@ VERBS = (
     "replay",
     "errors",
     "view",
+    "paper",
 )
 """In the order of the flow. Each is a module here (``import_`` for ``import``) with a ``command``, or an ``app``."""
 

@@ -27,7 +27,7 @@ _LOOK_BACK_S: Final = 0.3
 """How far driving is thought ahead: forwards far enough to go round things, backwards, where the LiDAR is blind and a
 network can only guess, no farther than stopping takes."""
 _LOOK_STEP_S: Final = 0.1
-_ROOM_M: Final = 0.05
+_ROOM_M: Final = 0.08
 _ESCAPE_M: Final = 0.02
 """A motion is also right when it gains this much room."""
 _FIRST_FRONT_RAY: Final = 150

@@ -1,0 +1,98 @@
+"""The pictures of the follow study."""
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Final
+
+import polars as pl
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
+from matplotlib.ticker import PercentFormatter
+
+from sdt_tools.evaluation.figure import OUTCOME_COLOURS
+from sdt_tools.paper.follow_tables import FollowTables, level_rows, scenario_counts, sweep_rows
+from sdt_tools.paper.printed import LEVELS, SCENARIOS
+from sdt_tools.scene.figure import draw_room
+from sdt_tools.scene.scenario import layout_for
+
+_LEVEL_COLOURS: Final = {1: "#2a9d8f", 2: "#1f6feb", 3: "#d1495b"}
+_PAPER: Final = "#adb5bd"
+
+
+def scenarios_overview(tables: FollowTables, families: Mapping[str, str], out: Path) -> None:
+    """Each scenario with the driven paths of one seed's networks: a column a scenario, a row a family."""
+    drawn = [family for family in families if not tables.runs.filter(pl.col("family") == family).is_empty()]
+    seed = int(tables.runs["seed"].to_numpy().min())
+    figure = Figure(figsize=(2.3 * len(SCENARIOS), 1.9 * len(drawn) + 0.6), layout="constrained")
+    FigureCanvasAgg(figure)
+    panels = figure.subplots(len(drawn), len(SCENARIOS), squeeze=False)
+    for row, family in zip(panels, drawn, strict=True):
+        for panel, scenario in zip(row, SCENARIOS, strict=True):
+            draw_room(panel, layout_for(scenario, seed))
+            panel.set_axis_off()
+            chosen = (pl.col("family") == family) & (pl.col("scenario") == scenario) & (pl.col("seed") == seed)
+            for run in tables.runs.filter(chosen).iter_rows(named=True):
+                trace = tables.traces.filter(chosen & (pl.col("network") == run["network"])).sort("time_s")
+                colour = OUTCOME_COLOURS[run["outcome"]]
+                panel.plot(trace["robot_x_m"], trace["robot_y_m"], color=colour, linewidth=1.1, alpha=0.8)
+                if run["outcome"] != "ok":
+                    panel.plot(trace["robot_x_m"][-1:], trace["robot_y_m"][-1:], "x", color=colour, markersize=5)
+            if family == drawn[0]:
+                panel.set_title(scenario.replace("_", " "), fontsize=9)
+        row[0].text(
+            -0.05, 0.5, families[family], transform=row[0].transAxes, rotation=90, ha="right", va="center", fontsize=8
+        )
+    colours = ", ".join(f"{name}" for name in OUTCOME_COLOURS)
+    figure.suptitle(f"Driven paths in the worlds of seed {seed}, one line a training seed ({colours})", fontsize=10)
+    figure.savefig(out, dpi=90)
+
+
+def sweep_figure(tables: FollowTables, out: Path) -> None:
+    """Validation accuracy over λ, a line a level."""
+    rows = sweep_rows(tables)
+    figure = Figure(figsize=(6.5, 3.8), layout="constrained")
+    FigureCanvasAgg(figure)
+    axes = figure.subplots()
+    for level, colour in _LEVEL_COLOURS.items():
+        mine = [row for row in rows if row["level"] == level]
+        weights, middle = [row["weight"] for row in mine], [row["val_accuracy"][1] for row in mine]
+        axes.plot(weights, middle, "o-", color=colour, label=f"level {level}")
+        axes.vlines(
+            weights, [r["val_accuracy"][0] for r in mine], [r["val_accuracy"][2] for r in mine], color=colour, alpha=0.5
+        )
+        for row in mine:
+            note = f"{row['least_certified']}"
+            axes.annotate(note, (row["weight"], row["val_accuracy"][1]), (4, 5), textcoords="offset points", fontsize=7)
+    axes.set(xscale="log", xlabel="λ", ylabel="validation accuracy", ylim=(0.0, 1.0))
+    axes.set_title("Strictness costs accuracy; numbers are certified domains of 240 in the worst network", fontsize=9)
+    axes.yaxis.set_major_formatter(PercentFormatter(1.0, decimals=0))
+    axes.grid(alpha=0.25)
+    axes.legend(frameon=False)
+    figure.savefig(out, dpi=110)
+
+
+def margins_overview(tables: FollowTables, families: Mapping[str, str], out: Path) -> None:
+    """What each family reaches on validation frames and in closed loop, the paper's figures beside it."""
+    rows = level_rows(tables, list(families))
+    counts = scenario_counts(tables, list(families))
+    figure = Figure(figsize=(9.0, 3.8), layout="constrained")
+    FigureCanvasAgg(figure)
+    accuracy, driving = figure.subplots(1, 2, sharey=True)
+    for place, row in enumerate(rows):
+        low, middle, high = row["val_accuracy"]
+        accuracy.errorbar(middle, place, xerr=[[middle - low], [high - middle]], fmt="o", color="#1f6feb", capsize=3)
+        total = counts[row["family"]]["total"]
+        driving.plot(total["ok"] / max(total["runs"], 1), place, "o", color="#1f6feb")
+        printed = LEVELS.get(row["level"]) if row["size"] == "paper" else None
+        if printed:
+            accuracy.plot(printed.val_percent / 100, place, "D", color=_PAPER)
+            driving.plot(len(printed.passed) / len(SCENARIOS), place, "D", color=_PAPER)
+    accuracy.set_yticks(range(len(rows)), [families[row["family"]] for row in rows])
+    accuracy.invert_yaxis()
+    accuracy.set(title="validation accuracy", xlim=(0.0, 1.0))
+    driving.set(title="scenario runs that end well", xlim=(0.0, 1.02))
+    for axes in (accuracy, driving):
+        axes.xaxis.set_major_formatter(PercentFormatter(1.0, decimals=0))
+        axes.grid(alpha=0.25)
+    figure.suptitle("Measured (blue) and printed in the paper (grey diamonds)", fontsize=10)
+    figure.savefig(out, dpi=110)
