@@ -14,6 +14,8 @@ from sdt_tools.evaluation.outcome import Judge, Situation, SuccessConfig, Verdic
 from sdt_tools.evaluation.policies import Policy
 from sdt_tools.evaluation.results import RunResult, TracePoint
 from sdt_tools.frames import RAYS, LidarScan, MotionClass, MotionCommand, Twist
+from sdt_tools.models.preprocess import FIRST_FRONT_RAY, LAST_FRONT_RAY
+from sdt_tools.robustness.domains import SafetyLevel, distance_rms_m
 from sdt_tools.scene.config import PHYSICS_HZ, SceneConfig
 from sdt_tools.scene.expert import SceneExpert
 from sdt_tools.scene.layout import Layout
@@ -135,15 +137,36 @@ def _decide(
     config: ClosedLoopConfig,
 ) -> None:
     motions = policy.decide(np.stack([scan.ranges_m for scan in scans]), [run.expert for run in runs])
-    for run, scan, true_m, motion in zip(runs, scans, true_ranges_m, motions, strict=True):
+    surroundings = _surroundings(true_ranges_m)
+    for run, scan, around, motion in zip(runs, scans, surroundings, motions, strict=True):
         situation = _situation(run)
-        run.trace.append(_trace_point(run.world, situation, float(true_m[FRONT_RAYS].min()), motion))
+        run.trace.append(_trace_point(run.world, situation, around, motion))
         run.twist = config.scene.motions.twist(motion)
         if run.recorder:
             run.recorder.command(
                 MotionCommand(scan.stamp_ns, motion, run.twist, driver=policy.name, expert=run.expert.advise())
             )
         run.verdict = run.judge.see(situation)
+
+
+@dataclass(frozen=True)
+class _Surroundings:
+    """The fields of a ``TracePoint`` that come from the true scan."""
+
+    front_range_m: float
+    watched_range_m: float
+    level3_rms_m: float
+    level4_rms_m: float
+
+
+def _surroundings(true_ranges_m: Float64[np.ndarray, "runs rays"]) -> list[_Surroundings]:
+    columns = (
+        true_ranges_m[:, FRONT_RAYS].min(axis=1),
+        true_ranges_m[:, FIRST_FRONT_RAY : LAST_FRONT_RAY + 1].min(axis=1),
+        distance_rms_m(true_ranges_m, SafetyLevel.THREE),
+        distance_rms_m(true_ranges_m, SafetyLevel.FOUR),
+    )
+    return [_Surroundings(*values) for values in np.stack(columns, axis=1).tolist()]
 
 
 def _situation(run: _Run) -> Situation:
@@ -161,7 +184,7 @@ def _situation(run: _Run) -> Situation:
     )
 
 
-def _trace_point(world: World, now: Situation, front_range_m: float, motion: MotionClass) -> TracePoint:
+def _trace_point(world: World, now: Situation, around: _Surroundings, motion: MotionClass) -> TracePoint:
     return TracePoint(
         time_s=now.time_s,
         robot_x_m=now.robot.x_m,
@@ -171,7 +194,7 @@ def _trace_point(world: World, now: Situation, front_range_m: float, motion: Mot
         operator_y_m=world.operator.y_m,
         operator_range_m=now.operator_range_m,
         operator_bearing_rad=now.operator_bearing_rad,
-        front_range_m=front_range_m,
+        **vars(around),
         motion=motion.label,
     )
 

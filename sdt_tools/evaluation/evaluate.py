@@ -13,8 +13,9 @@ import polars as pl
 from sdt_tools.config import dump_config
 from sdt_tools.errors import UsageError
 from sdt_tools.evaluation.closed_loop import ClosedLoopConfig, drive_closed_loop
+from sdt_tools.evaluation.failures import Nesting, WhereFailed, failure_table, nesting, where_failed
 from sdt_tools.evaluation.policies import policy_for
-from sdt_tools.evaluation.results import RUNS_FILE, TRACES_FILE, Tally, tally, write_results
+from sdt_tools.evaluation.results import RUNS_FILE, TRACES_FILE, Tally, tally, total, write_results
 from sdt_tools.evaluation.saving import SaveRuns, recorder_factory
 from sdt_tools.runs.local import Progress, run_units
 from sdt_tools.runs.unit import Unit, content_hash
@@ -24,6 +25,7 @@ from sdt_tools.scene.scenario import layout_for
 SEEDS_A_UNIT: Final = 10
 """Runs stepped together. The same whatever the number of workers, so that results do not depend on it."""
 
+FAILURES_FILE: Final = "failures.parquet"
 _TIMING_FILE = "timing.json"
 _RECORDINGS = "recordings"
 
@@ -32,14 +34,19 @@ _RECORDINGS = "recordings"
 class EvaluationSummary:
     """Tallies by model (as it was named in the call) and scenario, and where runs, traces and recordings lie.
 
-    ``real_time_factor`` is simulated robot-seconds per second of stepping, all workers together; starting processes is
-    left out of it.
+    ``total`` pools a model's scenarios. ``nesting`` compares each model with the next, ``where_failed`` sums up
+    ``failures``, a table with one row a failed run. ``real_time_factor`` is simulated robot-seconds per second of
+    stepping, all workers together; starting processes is left out of it.
     """
 
     models: Mapping[str, Mapping[str, Tally]]
+    total: Mapping[str, Tally]
+    nesting: tuple[Nesting, ...]
+    where_failed: tuple[WhereFailed, ...]
     real_time_factor: float
     runs: Path
     traces: Path
+    failures: Path
     recordings: tuple[Path, ...]
 
 
@@ -55,8 +62,8 @@ def evaluate_follow(
 ) -> EvaluationSummary:
     """Drive every model through every scenario with every seed, in blocks that are skipped where ``out`` has them.
 
-    ``models`` are checkpoint folders, ``expert`` or ``constant:<class>``; ``scenarios`` names or files. Raises
-    UsageError for empty or repeated arguments, and whatever loading a model or a scenario raises, before any run.
+    ``models`` are checkpoint folders, ``expert``, ``polar`` or ``constant:<class>``; ``scenarios`` names or files.
+    Raises UsageError for empty or repeated arguments and what loading a model or a scenario raises, before any run.
     """
     _check(models, scenarios, seeds)
     drawn = [[layout_for(scenario, seed) for seed in seeds] for scenario in scenarios]
@@ -70,11 +77,18 @@ def evaluate_follow(
     folders = iter(run_units([unit for group in units.values() for unit in group], out, workers, progress))
     by_model = {model: [next(folders) for _ in group] for model, group in units.items()}
     every = [folder for group in by_model.values() for folder in group]
+    runs, traces = _gather(by_model, RUNS_FILE, out), _gather(by_model, TRACES_FILE, out)
+    failures = failure_table(runs, traces)
+    failures.write_parquet(out / FAILURES_FILE)
     return EvaluationSummary(
-        models={model: _tally(group) for model, group in by_model.items()},
+        models=tally(runs),
+        total=total(runs),
+        nesting=tuple(nesting(runs, models)),
+        where_failed=tuple(where_failed(failures, models)),
         real_time_factor=_real_time_factor(every, workers),
-        runs=_gather(every, RUNS_FILE, out),
-        traces=_gather(every, TRACES_FILE, out),
+        runs=out / RUNS_FILE,
+        traces=out / TRACES_FILE,
+        failures=out / FAILURES_FILE,
         recordings=tuple(sorted(path for folder in every for path in (folder / _RECORDINGS).glob("*.mcap"))),
     )
 
@@ -137,16 +151,17 @@ def _units(name: str, model: str, layouts: Sequence[Layout], config: ClosedLoopC
     ]
 
 
-def _tally(folders: Sequence[Path]) -> dict[str, Tally]:
-    runs = pl.concat([pl.read_parquet(folder / RUNS_FILE) for folder in folders])
-    (by_scenario,) = tally(runs).values()
-    return by_scenario
-
-
-def _gather(folders: Sequence[Path], file: str, out: Path) -> Path:
-    table = pl.concat([pl.read_parquet(folder / file) for folder in folders])
+def _gather(by_model: Mapping[str, Sequence[Path]], file: str, out: Path) -> pl.DataFrame:
+    """The tables ``file`` of all units as one, the model as it was named before each row; written to ``out`` too."""
+    table = pl.concat(
+        [
+            pl.read_parquet(folder / file).select(pl.lit(model).alias("model"), pl.all())
+            for model, folders in by_model.items()
+            for folder in folders
+        ]
+    )
     table.write_parquet(out / file)
-    return out / file
+    return table
 
 
 def _real_time_factor(folders: Sequence[Path], workers: int) -> float:

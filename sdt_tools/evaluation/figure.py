@@ -1,6 +1,7 @@
-"""Driven paths on their layouts: one small map a run."""
+"""Driven paths on their layouts: one small map a run, or all scenarios side by side."""
 
 import math
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Final
 
@@ -43,6 +44,46 @@ def runs_figure(runs: pl.DataFrame, traces: pl.DataFrame, scenario: str, title: 
     figure.suptitle(title, fontsize=11)
     figure.legend(handles=_legend(set(runs["outcome"])), loc="outside lower center", ncols=6, fontsize=8, frameon=False)
     figure.savefig(out, dpi=90)
+
+
+def scenarios_figure(
+    runs: pl.DataFrame, traces: pl.DataFrame, scenarios: Sequence[str], rows: Mapping[str, str], seed: int, out: Path
+) -> None:
+    """Draw every scenario in the world of ``seed``, with all paths driven in it: a row a model, or group of models.
+
+    ``rows`` are values of the tables' column ``model`` and what to call them; ``scenarios`` the names or files that the
+    runs were made with. Runs of one row are drawn over each other, the place of a failure is marked.
+    """
+    layouts = [layout_for(scenario, seed) for scenario in scenarios]
+    figure = Figure(figsize=(2.3 * len(layouts) + 0.4, 1.9 * len(rows) + 0.8), layout="constrained")
+    FigureCanvasAgg(figure)
+    grid = figure.subplots(len(rows), len(layouts), squeeze=False)
+    shown = runs.filter(pl.col("seed") == seed)
+    paths = traces.filter(pl.col("seed") == seed)
+    for panel, layout in zip(grid[0], layouts, strict=True):
+        panel.set_title(layout.name.replace("_", " "), fontsize=9)
+    for panels, (model, title) in zip(grid, rows.items(), strict=True):
+        for panel, layout in zip(panels, layouts, strict=True):
+            draw_room(panel, layout)
+            panel.set(xticks=[], yticks=[], frame_on=False)
+            here = (pl.col("model") == model) & (pl.col("scenario") == layout.name)
+            for run in shown.filter(here).iter_rows(named=True):
+                _draw_path(panel, paths.filter(here & (pl.col("policy") == run["policy"])), run["outcome"])
+        panels[0].set_ylabel(title, fontsize=8)
+    figure.suptitle(f"Seed {seed}; failures end in a cross", fontsize=10)
+    outcomes = set(shown["outcome"])
+    figure.legend(handles=_legend(outcomes), loc="outside lower center", ncols=7, fontsize=8, frameon=False)
+    figure.savefig(out, dpi=90)
+
+
+def _draw_path(panel: Axes, trace: pl.DataFrame, outcome: str) -> None:
+    """One of several paths: thin, its end marked where it failed."""
+    trace = trace.sort("time_s")
+    colour = OUTCOME_COLOURS[outcome]
+    panel.plot(trace["operator_x_m"], trace["operator_y_m"], color="#adb5bd", linewidth=0.8, linestyle="--")
+    panel.plot(trace["robot_x_m"], trace["robot_y_m"], color=colour, linewidth=1.1, alpha=0.8)
+    if outcome != Outcome.OK.value:
+        panel.plot(trace["robot_x_m"][-1:], trace["robot_y_m"][-1:], "x", color=colour, markersize=6)
 
 
 def _draw_run(panel: Axes, trace: pl.DataFrame, outcome: str) -> None:

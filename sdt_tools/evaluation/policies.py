@@ -1,4 +1,4 @@
-"""Who drives in an evaluation: a network, the expert, or a constant class as a baseline that must fail."""
+"""Who drives in an evaluation: a network, the expert, or a baseline that must fail: a constant class, a polar rule."""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -11,6 +11,7 @@ from sdt_tools.frames import MotionClass, motion_labelled
 from sdt_tools.models.checkpoint import load_checkpoint
 from sdt_tools.models.loaded import LoadedModel
 from sdt_tools.protocols import Expert
+from sdt_tools.scene.expert import SceneExpert
 
 
 @runtime_checkable
@@ -51,6 +52,21 @@ class ExpertPolicy:
         return [expert.advise() for expert in experts]
 
 
+class PolarPolicy:
+    """The expert's rule for range and bearing of the operator, blind to everything else."""
+
+    name = "polar"
+
+    def decide(self, ranges_m: Float64[np.ndarray, "runs rays"], experts: Sequence[Expert]) -> list[MotionClass]:
+        """One motion a run."""
+        assert len(experts) == len(ranges_m)
+        answers = []
+        for expert in experts:
+            assert isinstance(expert, SceneExpert)
+            answers.append(expert.advise_in_the_open())
+        return answers
+
+
 class ConstantPolicy:
     """Always the same class."""
 
@@ -65,12 +81,15 @@ class ConstantPolicy:
 
 
 def policy_for(spec: str) -> Policy:
-    """The policy called ``expert``, ``constant:<class>``, or kept in a checkpoint folder, ``policy:`` before it or not.
+    """The policy called ``expert``, ``polar`` or ``constant:<class>``, or kept in a checkpoint folder.
 
-    Raises UsageError for an unknown class, CheckpointError for a folder that holds no follow network.
+    ``policy:`` may stand before a folder. Raises UsageError for an unknown class, CheckpointError for
+    a folder that holds no follow network.
     """
     if spec == "expert":
         return ExpertPolicy()
+    if spec == "polar":
+        return PolarPolicy()
     if spec.startswith("constant:"):
         return ConstantPolicy(motion_labelled(spec.removeprefix("constant:")))
     return NetworkPolicy(load_checkpoint(Path(spec.removeprefix("policy:"))))

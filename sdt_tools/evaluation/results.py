@@ -15,9 +15,11 @@ TRACES_FILE = "traces.parquet"
 
 @dataclass(frozen=True)
 class TracePoint:
-    """One decision: where robot centre and operator were, what was decided, and how near the nearest thing ahead was.
+    """One decision: where robot centre and operator were, what was decided, and how near things ahead were.
 
-    Range and bearing of the operator are taken from the LiDAR.
+    Range and bearing of the operator are taken from the LiDAR. ``front_range_m`` is the nearest true range within ±20°
+    of straight ahead, ``watched_range_m`` that over the rays of the safety domains; ``level3_rms_m`` and
+    ``level4_rms_m`` are the true scan's distances to the nearest domain of these levels, root mean square per ray.
     """
 
     time_s: float
@@ -29,6 +31,9 @@ class TracePoint:
     operator_range_m: float
     operator_bearing_rad: float
     front_range_m: float
+    watched_range_m: float
+    level3_rms_m: float
+    level4_rms_m: float
     motion: str
 
 
@@ -48,7 +53,7 @@ class RunResult:
 
 @dataclass(frozen=True)
 class Tally:
-    """How one policy did in one scenario."""
+    """How one policy did: runs that ended well, their share's Wilson interval, and all outcomes."""
 
     ok: int
     runs: int
@@ -85,10 +90,19 @@ def write_results(folder: Path, results: Sequence[RunResult]) -> None:
 
 
 def tally(runs: pl.DataFrame) -> dict[str, dict[str, Tally]]:
-    """Outcomes counted by policy and scenario, with the Wilson interval of the share that is ok."""
+    """Outcomes counted by model and scenario."""
     result: dict[str, dict[str, Tally]] = {}
-    for (policy, scenario), group in runs.group_by("policy", "scenario", maintain_order=True):
-        counts = {outcome.value: int((group["outcome"] == outcome.value).sum()) for outcome in Outcome}
-        ok = counts[Outcome.OK.value]
-        result.setdefault(str(policy), {})[str(scenario)] = Tally(ok, len(group), wilson(ok, len(group)), counts)
+    for (model, scenario), group in runs.group_by("model", "scenario", maintain_order=True):
+        result.setdefault(str(model), {})[str(scenario)] = _counted(group)
     return result
+
+
+def total(runs: pl.DataFrame) -> dict[str, Tally]:
+    """Outcomes counted by model, all scenarios together."""
+    return {str(model): _counted(group) for (model,), group in runs.group_by("model", maintain_order=True)}
+
+
+def _counted(runs: pl.DataFrame) -> Tally:
+    counts = {outcome.value: int((runs["outcome"] == outcome.value).sum()) for outcome in Outcome}
+    ok = counts[Outcome.OK.value]
+    return Tally(ok, len(runs), wilson(ok, len(runs)), counts)

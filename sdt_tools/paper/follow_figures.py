@@ -9,42 +9,21 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.ticker import PercentFormatter
 
-from sdt_tools.evaluation.figure import OUTCOME_COLOURS
+from sdt_tools.evaluation.figure import scenarios_figure
 from sdt_tools.paper.follow_tables import FollowTables, level_rows, scenario_counts, sweep_rows
-from sdt_tools.paper.printed import LEVELS, SCENARIOS
-from sdt_tools.scene.figure import draw_room
-from sdt_tools.scene.scenario import layout_for
+from sdt_tools.paper.printed import LEVELS
+from sdt_tools.scene.scenario import STANDARD_FOLLOW
 
 _LEVEL_COLOURS: Final = {1: "#2a9d8f", 2: "#1f6feb", 3: "#d1495b"}
 _PAPER: Final = "#adb5bd"
 
 
 def scenarios_overview(tables: FollowTables, families: Mapping[str, str], out: Path) -> None:
-    """Each scenario with the driven paths of one seed's networks: a column a scenario, a row a family."""
-    drawn = [family for family in families if not tables.runs.filter(pl.col("family") == family).is_empty()]
-    seed = int(tables.runs["seed"].to_numpy().min())
-    figure = Figure(figsize=(2.3 * len(SCENARIOS), 1.9 * len(drawn) + 0.6), layout="constrained")
-    FigureCanvasAgg(figure)
-    panels = figure.subplots(len(drawn), len(SCENARIOS), squeeze=False)
-    for row, family in zip(panels, drawn, strict=True):
-        for panel, scenario in zip(row, SCENARIOS, strict=True):
-            draw_room(panel, layout_for(scenario, seed))
-            panel.set_axis_off()
-            chosen = (pl.col("family") == family) & (pl.col("scenario") == scenario) & (pl.col("seed") == seed)
-            for run in tables.runs.filter(chosen).iter_rows(named=True):
-                trace = tables.traces.filter(chosen & (pl.col("network") == run["network"])).sort("time_s")
-                colour = OUTCOME_COLOURS[run["outcome"]]
-                panel.plot(trace["robot_x_m"], trace["robot_y_m"], color=colour, linewidth=1.1, alpha=0.8)
-                if run["outcome"] != "ok":
-                    panel.plot(trace["robot_x_m"][-1:], trace["robot_y_m"][-1:], "x", color=colour, markersize=5)
-            if family == drawn[0]:
-                panel.set_title(scenario.replace("_", " "), fontsize=9)
-        row[0].text(
-            -0.05, 0.5, families[family], transform=row[0].transAxes, rotation=90, ha="right", va="center", fontsize=8
-        )
-    colours = ", ".join(f"{name}" for name in OUTCOME_COLOURS)
-    figure.suptitle(f"Driven paths in the worlds of seed {seed}, one line a training seed ({colours})", fontsize=10)
-    figure.savefig(out, dpi=90)
+    """Each scenario with the driven paths of all networks in the first seed's worlds: a row a family."""
+    by_family = [table.with_columns(pl.col("family").alias("model")) for table in (tables.runs, tables.traces)]
+    runs, traces = by_family
+    drawn = {family: title for family, title in families.items() if family in set(runs["family"])}
+    scenarios_figure(runs, traces, STANDARD_FOLLOW, drawn, min(runs["seed"].to_list()), out)
 
 
 def sweep_figure(tables: FollowTables, out: Path) -> None:
@@ -86,7 +65,7 @@ def margins_overview(tables: FollowTables, families: Mapping[str, str], out: Pat
         printed = LEVELS.get(row["level"]) if row["size"] == "paper" else None
         if printed:
             accuracy.plot(printed.val_percent / 100, place, "D", color=_PAPER)
-            driving.plot(len(printed.passed) / len(SCENARIOS), place, "D", color=_PAPER)
+            driving.plot(len(printed.passed) / len(STANDARD_FOLLOW), place, "D", color=_PAPER)
     accuracy.set_yticks(range(len(rows)), [families[row["family"]] for row in rows])
     accuracy.invert_yaxis()
     accuracy.set(title="validation accuracy", xlim=(0.0, 1.0))

@@ -16,7 +16,8 @@ from sdt_tools.paper.follow_tables import (
     scenario_counts,
     sweep_rows,
 )
-from sdt_tools.paper.printed import LEVELS, SCENARIOS
+from sdt_tools.paper.printed import LEVELS
+from sdt_tools.scene.scenario import STANDARD_FOLLOW
 from sdt_tools.statistics import wilson
 
 REPORT: Final = "follow.md"
@@ -105,7 +106,7 @@ def _scenarios(tables: FollowTables) -> str:
         "| scenario | " + " | ".join(FAMILIES.values()) + " |",
         "|---|" + "---|" * len(FAMILIES),
     ]
-    for scenario in SCENARIOS:
+    for scenario in STANDARD_FOLLOW:
         cells = [_cell(counts[family][scenario], family, scenario) for family in FAMILIES]
         lines.append(f"| {scenario.replace('_', ' ')} | " + " | ".join(cells) + " |")
     totals = [counts[family]["total"] for family in FAMILIES]

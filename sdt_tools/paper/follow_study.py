@@ -18,9 +18,9 @@ from sdt_tools.paper.follow_data import study_data
 from sdt_tools.paper.follow_models import MAIN, Family, Trained, settings, swept, train_models
 from sdt_tools.paper.follow_report import write_follow_report
 from sdt_tools.paper.follow_tables import FollowTables
-from sdt_tools.paper.printed import SCENARIOS
 from sdt_tools.runs.local import run_units
 from sdt_tools.runs.unit import Unit, execute
+from sdt_tools.scene.scenario import STANDARD_FOLLOW
 
 _LOW_IS_GOOD: Final = re.compile("pasted|flipped|loss")
 
@@ -34,7 +34,7 @@ def run_follow_study(out: Path, config: FollowStudyConfig, workers: int, progres
     driven = train_models(out, dict.fromkeys(MAIN, config.training_seeds), *data, config, workers, progress)
     evaluation = evaluate_follow(
         [str(one.checkpoint) for one in driven],
-        SCENARIOS,
+        STANDARD_FOLLOW,
         range(config.first_reported_seed, config.first_reported_seed + config.runs),
         config.evaluation,
         out / "evaluation",

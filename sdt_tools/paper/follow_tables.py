@@ -7,7 +7,7 @@ from typing import Any
 import polars as pl
 
 from sdt_tools.frames import FORWARD_CLASSES
-from sdt_tools.paper.printed import SCENARIOS
+from sdt_tools.scene.scenario import STANDARD_FOLLOW
 
 _FORWARD = [motion.label for motion in FORWARD_CLASSES]
 _LOOK_BACK_S = 1.0
@@ -58,7 +58,7 @@ def scenario_counts(tables: FollowTables, families: Sequence[str]) -> dict[str, 
     counts: dict[str, dict[str, dict[str, int]]] = {}
     for family in families:
         runs = tables.runs.filter(pl.col("family") == family)
-        parts = {name: runs.filter(pl.col("scenario") == name) for name in SCENARIOS} | {"total": runs}
+        parts = {name: runs.filter(pl.col("scenario") == name) for name in STANDARD_FOLLOW} | {"total": runs}
         counts[family] = {
             name: {"ok": int((part["outcome"] == _OK).sum()), "runs": len(part)} for name, part in parts.items()
         }

@@ -52,27 +52,32 @@ class SceneExpert:
 
     def advise(self) -> MotionClass:
         """The motion that the expert would choose now."""
-        world, lidar, operator = self._world, self._world.lidar_pose, self._world.operator
+        world, lidar = self._world, self._world.lidar_pose
         cast_rays(lidar.x_m, lidar.y_m, lidar.yaw_rad, world.segments, world.circles, self._scan)
         front_m = self._scan[_FIRST_FRONT_RAY : _LAST_FRONT_RAY + 1].min()
-        bearing_rad = math.remainder(
-            math.atan2(operator.y_m - lidar.y_m, operator.x_m - lidar.x_m) - lidar.yaw_rad, 2 * math.pi
-        )
-        range_m = math.hypot(operator.x_m - lidar.x_m, operator.y_m - lidar.y_m)
         robot = world.robot
         return MotionClass(
             _choose(
                 robot.x_m,
                 robot.y_m,
                 robot.yaw_rad,
-                range_m,
-                bearing_rad,
+                *self._operator(),
                 front_m <= _FRONT_STOP_M,
                 world.segments,
                 world.circles,
                 self._twists,
             )
         )
+
+    def advise_in_the_open(self) -> MotionClass:
+        """The polar rule alone: what the expert would choose if nothing stood around."""
+        return MotionClass(polar_rule(*self._operator()))
+
+    def _operator(self) -> tuple[float, float]:
+        """His range in metres and bearing in radians, seen from the LiDAR."""
+        lidar, operator = self._world.lidar_pose, self._world.operator
+        dx_m, dy_m = operator.x_m - lidar.x_m, operator.y_m - lidar.y_m
+        return math.hypot(dx_m, dy_m), math.remainder(math.atan2(dy_m, dx_m) - lidar.yaw_rad, 2 * math.pi)
 
 
 @njit(cache=True)

@@ -21,6 +21,17 @@ from sdt_tools.scene.practice_courses import course_layout
 from sdt_tools.scene.seeds import Stream, generator
 from sdt_tools.scene.validity import check_layout
 
+STANDARD_FOLLOW: Final = (
+    "plain",
+    "around_boxes",
+    "out_of_corner",
+    "through_gate",
+    "around_table",
+    "garage_parking",
+    "narrow_hallway",
+)
+"""The standard scenarios of the follow network, in the order of the paper's Table IV."""
+
 _FOLDER: Final = Path(__file__).parent / "scenarios"
 
 
