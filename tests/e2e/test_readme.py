@@ -17,6 +17,7 @@ from sdt_tools.models.card import ModelCard
 from sdt_tools.models.checkpoint import save_checkpoint
 from sdt_tools.models.follow_net import FollowNet, FollowNetConfig, new_follow_net
 from sdt_tools.models.preprocess import PreprocessConfig
+from sdt_tools.robustness.domain_file import load_domains
 from sdt_tools.scene.scenario import layout_for
 
 ROOT = Path(__file__).parents[2]
@@ -27,6 +28,10 @@ SMALLER = {
     "--out analysis/practice\n": "--out analysis/practice --val-share 0.5\n",
     "--out analysis/my_follow": "--out analysis/my_follow --epochs 1",
     "--seeds 1000-1019": "--seeds 1000-1001",
+    "--out analysis/my_certified\n": "--out analysis/my_certified --epochs 2 --delta 1000\n",
+    "--export analysis/my_certified_onnx": "--export analysis/my_certified_onnx --restarts 1 --steps 1",
+    "analysis/practice --level 3": "analysis/practice --level 3 --restarts 1 --steps 1 --near-scans 4",
+    "--figures": "--figures --scenario plain --seeds 1000",
 }
 
 
@@ -50,7 +55,7 @@ def workplace(tmp_path: Path) -> Path:
 
 
 def test_the_commands_run_in_the_order_they_are_given(workplace: Path) -> None:
-    assert len(blocks()) == 4
+    assert len(blocks()) == 5
     script = "".join(blocks())
     for said, small in SMALLER.items():
         script = script.replace(said, small)
@@ -61,9 +66,20 @@ def test_the_commands_run_in_the_order_they_are_given(workplace: Path) -> None:
 
 
 def test_the_scenario_can_be_played(tmp_path: Path) -> None:
-    (example,) = re.findall(r"```toml\n(.*?)```", README, re.DOTALL)
-    (tmp_path / "my_room.toml").write_text(example)
+    (tmp_path / "my_room.toml").write_text(toml_with("mirror ="))
     assert {layout_for(str(tmp_path / "my_room.toml"), seed).name for seed in range(20)} == {"my_room"}
+
+
+def test_the_domains_can_be_loaded(tmp_path: Path) -> None:
+    (tmp_path / "shins.toml").write_text(toml_with("[[domain]]"))
+    (boxes,) = load_domains(tmp_path / "shins.toml")
+    assert len(boxes) == 240
+
+
+def toml_with(key: str) -> str:
+    """The one TOML example that has ``key``."""
+    (example,) = [text for text in re.findall(r"```toml\n(.*?)```", README, re.DOTALL) if key in text]
+    return example
 
 
 def test_what_is_made_smaller_is_in_the_readme() -> None:
