@@ -47,8 +47,9 @@ class FollowStudyConfig(Config):
     """The study's sizes. Practice and training seeds lie below 1,000, reported ones from ``first_reported_seed`` on.
 
     ``paper_data`` is of the paper's size, drawn anew for each training seed from the expert's recordings in practice
-    worlds; ``large_data`` is drawn once from everything. ``swept_weights`` are values of λ beside the recipe's, tried
-    with ``sweep_seeds`` networks each. ``searched_hard`` is the search for violations in one certified network.
+    worlds; ``large_data`` is drawn once from everything, and read by networks of ``large_architecture``, the same nine
+    layers but wider: the narrow one does not take in so much. ``swept_weights`` are values of λ beside the recipe's,
+    tried with ``sweep_seeds`` networks each. ``searched_hard`` is the search for violations in one certified network.
     """
 
     training_seeds: int = Field(default=5, ge=1)
@@ -57,7 +58,7 @@ class FollowStudyConfig(Config):
     paper_data: DatasetConfig = DatasetConfig(train_frames=TRAINING_FRAMES, val_frames=VALIDATION_FRAMES)
     large_data: DatasetConfig = DatasetConfig(train_frames=40_000, val_frames=8_000, per_recording_cap=70)
     large_epochs: int = Field(default=30, ge=1)
-    large_architecture: FollowNetConfig = FollowNetConfig(dropout=0.2)
+    large_architecture: FollowNetConfig = FollowNetConfig(widths=(20, 28, 40, 56, 56, 56, 56), hidden=96, dropout=0.2)
     paper_epochs: int = Field(default=80, ge=1)
     first_reported_seed: int = Field(default=1000, ge=1000)
     runs: int = Field(default=20, ge=1)

@@ -11,6 +11,7 @@ from sdt_tools.models.card import ModelCard
 from sdt_tools.models.checkpoint import save_checkpoint
 from sdt_tools.models.follow_net import FollowNet, FollowNetConfig, new_follow_net
 from sdt_tools.models.preprocess import PreprocessConfig
+from sdt_tools.scene.scenario import STANDARD_FOLLOW
 
 
 @pytest.mark.parametrize("driver", ["expert", "network"])
@@ -27,6 +28,17 @@ def test_closed_loop_on_two_processes(benchmark: BenchmarkFixture, tmp_path: Pat
 
     benchmark.pedantic(evaluate, rounds=3)
     benchmark.extra_info["real_time_factor"] = [round(factor) for factor in factors]
+
+
+def test_seven_scenarios_by_twenty_seeds(benchmark: BenchmarkFixture, tmp_path: Path) -> None:
+    """140 runs of one driver on two processes, at most 90 s; the expert, so that they last as they should."""
+    rounds = iter(range(100))
+
+    def evaluate() -> None:
+        out = tmp_path / str(next(rounds))
+        evaluate_follow(["expert"], STANDARD_FOLLOW, range(1000, 1020), ClosedLoopConfig(), out, workers=2)
+
+    benchmark.pedantic(evaluate, rounds=1)
 
 
 def _untrained(folder: Path) -> Path:

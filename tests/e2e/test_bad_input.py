@@ -155,3 +155,33 @@ def test_a_scenario_that_cannot_be_is_refused(sdt: Sdt, tmp_path: Path, line: st
     (tmp_path / "own.toml").write_text(line + "\noperator = { path = [[1.5, 0.0], [4.0, 0.0]] }\n")
     assert_refused(sdt("record", "scene", "--scenario", "own.toml", "--no-camera", "--out", "x.mcap"), said)
     assert not (tmp_path / "x.mcap").exists()
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        (["--level", "3", "--domains", "own.toml"], ["level", "domains", "contradict"]),
+        (["--level", "2", "--epsilon-m", "0.1"], ["level", "epsilon_m", "contradict"]),
+        (["--arch", "transformer"], ["transformer", "plain or gate"]),
+        (["--inner", "guess"], ["safety.inner", "ibp", "pgd"]),
+        (["--level", "1", "--delta", "0"], ["safety.delta", "greater than 0"]),
+        (["--level", "1", "--lambda", "-1"], ["safety.weight", "greater than 0"]),
+    ],
+)
+def test_training_options_that_make_no_sense_are_named(sdt: Sdt, options: list[str], words: list[str]) -> None:
+    assert_refused(sdt("train", "follow", "data", "--out", "out", *options), *words)
+
+
+def test_a_malformed_domain_file_is_named(sdt: Sdt, model: Path, tmp_path: Path) -> None:
+    (tmp_path / "own.toml").write_text('[[domain]]\nname = "x"\nallowed = []\n')
+    for verb in (["certify", model], ["attack", "follow", model], ["domains"]):
+        assert_refused(sdt(*verb, "--domains", "own.toml"), "own.toml", "allowed names no class")
+
+
+def test_level_0_has_nothing_to_certify(sdt: Sdt, model: Path) -> None:
+    assert_refused(sdt("certify", model, "--level", "0"), "level 0 asks for nothing")
+
+
+def test_a_missing_model_is_named_by_every_verb_that_takes_one(sdt: Sdt) -> None:
+    for verb in (["certify", "none", "--level", "1"], ["attack", "follow", "none", "--level", "1"]):
+        assert_refused(sdt(*verb), "none", "no such checkpoint")
