@@ -1,5 +1,4 @@
 from pathlib import Path
-from types import SimpleNamespace
 
 import pytest
 
@@ -11,7 +10,10 @@ from sdt_tools.training.follow import FollowTrainingConfig
 def test_a_training_that_was_interrupted_is_not_taken_for_finished(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(stages, "train_follow", lambda *_: SimpleNamespace(interrupted=True))
+    def interrupt(*arguments: object) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(stages, "train_follow", interrupt)
     unit = Unit("model", stages.train_stage, {"dataset": tmp_path / "data", "config": FollowTrainingConfig()})
     with pytest.raises(KeyboardInterrupt):
         execute(unit, tmp_path)

@@ -1,4 +1,3 @@
-import os
 import signal
 from collections import Counter
 from collections.abc import Iterator
@@ -43,7 +42,7 @@ class TapeSource:
             if isinstance(event, BaseException):
                 raise event
             if event is not None:
-                os.kill(os.getpid(), event)
+                signal.raise_signal(event)  # one that is sent may come late, and two as one
             self._next += 1
             yield self.messages[self._next - 1]
 
