@@ -53,7 +53,7 @@ def _attempt(rng: np.random.Generator, seed: int) -> Layout | None:
     """One draw; None if its elements stand in each other's way."""
     first: tuple[_Draw, ...] = (_start_ahead, _start_ahead, _start_ahead, _start_cornered, _start_garage)
     later: tuple[_Draw, ...] = (_open, _gate, _hall, _slalom, _table, _posts, _bend)
-    weights = (0.1, 0.24, 0.3, 0.15, 0.13, 0.04, 0.04)
+    weights = (0.08, 0.22, 0.28, 0.15, 0.2, 0.04, 0.03)
     elements = [first[rng.integers(len(first))](rng)]
     for _ in range(int(rng.integers(1, 4))):
         elements += [_open(rng)] if rng.random() < 0.5 else []

@@ -46,5 +46,5 @@ def _gate(specification: SpecificationConfig) -> FollowTrainingConfig:
         arch="gate",
         specification=specification,
         augment=AugmentConfig(near_miss_share=0.5),
-        safety=SafetyConfig(weight=0.3, start_share=0.5, ramp_share=0.2),
+        safety=SafetyConfig(weight=0.3, start_share=0.5, ramp_share=0.2, domains_a_step=16),
     )
