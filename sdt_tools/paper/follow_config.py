@@ -32,11 +32,12 @@ class PracticeConfig(Config):
 class AggregationConfig(Config):
     """Rounds of DAgger (Ross et al. 2011): a network drives the practice worlds, the expert says what was right.
 
-    Each round trains a plain level-0 network on what there is, for ``epochs`` epochs, and records it at the wheel of
-    all courses and of one in ``worlds_every`` practice worlds.
+    Each round trains a plain level-0 network of ``architecture`` on what there is, for ``epochs`` epochs, and records
+    it at the wheel of all courses and of one in ``worlds_every`` practice worlds. It is narrow: it is to make mistakes.
     """
 
     rounds: int = Field(default=3, ge=0)
+    architecture: FollowNetConfig = FollowNetConfig(dropout=0.2)
     epochs: int = Field(default=20, ge=1)
     seconds: float = Field(default=60.0, gt=1.0)
     worlds_every: int = Field(default=3, ge=1)

@@ -6,8 +6,11 @@ from pathlib import Path
 from typing import Final
 
 from sdt_tools.demo.demo import StageProgress
-from sdt_tools.paper import follow_stages as stages
+from sdt_tools.paper.dataset_stage import dataset_stage
 from sdt_tools.paper.follow_config import FollowStudyConfig
+from sdt_tools.paper.recording_stages import finished_courses_stage, record_stage
+from sdt_tools.paper.stage_folders import read_note
+from sdt_tools.paper.training_stage import train_stage
 from sdt_tools.recording.scene_session import SceneRecordingConfig
 from sdt_tools.robustness.domains import SafetyLevel
 from sdt_tools.runs.local import run_units
@@ -58,13 +61,13 @@ def _courses(out: Path, config: FollowStudyConfig, workers: int, progress: Stage
     units = [
         Unit(
             f"data/finished/{block[0]:04d}",
-            stages.finished_courses_stage,
+            finished_courses_stage,
             {"seeds": tuple(block), "config": config.evaluation},
         )
         for block in blocks
     ]
     folders = run_units(units, out, workers, partial(progress, "courses"))
-    seeds = [seed for folder in folders for seed in stages.read_note(folder)["seeds"]]
+    seeds = [seed for folder in folders for seed in read_note(folder)["seeds"]]
     return [_recording(config, PRACTICE_COURSE, seed, config.practice.course_seconds) for seed in seeds]
 
 
@@ -100,7 +103,7 @@ def _record(
     units = [
         Unit(
             f"recordings/{name}/{number:03d}",
-            stages.record_stage,
+            record_stage,
             {"configs": tuple(block), "model": model, "prefix": prefix},
         )
         for number, block in enumerate(blocks)
@@ -118,12 +121,12 @@ def _pilot(
     )
     dataset = execute(_dataset(f"data/pilot{number}", recorded, drawn), out)
     training = FollowTrainingConfig(
-        architecture=config.large_architecture, loop=LoopConfig(epochs=aggregation.epochs, extra_epochs=0)
+        architecture=aggregation.architecture, loop=LoopConfig(epochs=aggregation.epochs, extra_epochs=0)
     )
     name = f"pilot{number}"
     unit = Unit(
         f"models/{name}",
-        stages.train_stage,
+        train_stage,
         {"dataset": dataset, "config": training, "name": name},
         {"progress": lambda record, epochs: progress(f"training {name}", record.epoch, epochs)},
     )
@@ -132,4 +135,4 @@ def _pilot(
 
 def _dataset(name: str, recorded: Sequence[Path], config: object) -> Unit:
     arguments = {"recorded": tuple(recorded), "config": config, "level": int(SafetyLevel.FOUR)}
-    return Unit(name, stages.dataset_stage, arguments)
+    return Unit(name, dataset_stage, arguments)

@@ -6,8 +6,8 @@ from pathlib import Path
 from typing import Final, Literal
 
 from sdt_tools.demo.demo import StageProgress
-from sdt_tools.paper import follow_stages as stages
 from sdt_tools.paper.follow_config import FollowStudyConfig
+from sdt_tools.paper.training_stage import train_stage
 from sdt_tools.runs.local import run_units
 from sdt_tools.runs.unit import Unit
 from sdt_tools.training.follow import FollowTrainingConfig
@@ -74,7 +74,7 @@ def train_models(
     units = [
         Unit(
             f"models/{family.name}-seed{seed}",
-            stages.train_stage,
+            train_stage,
             {
                 "dataset": large_data if family.size == "large" else paper_data[seed],
                 "config": settings(family, seed, config),

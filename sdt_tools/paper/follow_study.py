@@ -12,12 +12,13 @@ import polars as pl
 from sdt_tools.config import dump_config
 from sdt_tools.demo.demo import StageProgress
 from sdt_tools.evaluation.evaluate import evaluate_follow
-from sdt_tools.paper import follow_stages as stages
 from sdt_tools.paper.follow_config import FollowStudyConfig
 from sdt_tools.paper.follow_data import study_data
 from sdt_tools.paper.follow_models import MAIN, Family, Trained, settings, swept, train_models
 from sdt_tools.paper.follow_report import write_follow_report
 from sdt_tools.paper.follow_tables import FollowTables
+from sdt_tools.paper.judging_stages import certify_stage, check_stage
+from sdt_tools.paper.stage_folders import read_note
 from sdt_tools.runs.local import run_units
 from sdt_tools.runs.unit import Unit, execute
 from sdt_tools.scene.scenario import STANDARD_FOLLOW
@@ -74,7 +75,7 @@ def _certify(
     units = [
         Unit(
             f"certificates/{one.checkpoint.name}",
-            stages.certify_stage,
+            certify_stage,
             {"model": one.checkpoint, "level": one.family.level or 3, "config": config.certify},
         )
         for one in trained
@@ -90,23 +91,23 @@ def _search_hard(
     progress("hard search", 0, 1)
     unit = Unit(
         f"searched/{one.checkpoint.name}",
-        stages.certify_stage,
+        certify_stage,
         {"model": one.checkpoint, "level": 4, "config": config.searched_hard},
     )
-    return stages.read_note(execute(unit, out))
+    return read_note(execute(unit, out))
 
 
 def _check(out: Path, trained: Sequence[Trained], data: Path, workers: int, progress: StageProgress) -> list[Path]:
     """The standing checks of each network, on the validation frames of the large data, which none has learnt from."""
     units = [
-        Unit(f"checks/{one.checkpoint.name}", stages.check_stage, {"model": one.checkpoint, "dataset": data})
+        Unit(f"checks/{one.checkpoint.name}", check_stage, {"model": one.checkpoint, "dataset": data})
         for one in trained
     ]
     return run_units(units, out, workers, partial(progress, "standing checks"))
 
 
 def _row(one: Trained, certificate: Path, config: FollowStudyConfig) -> dict[str, object]:
-    family, judged = one.family, stages.read_note(certificate)
+    family, judged = one.family, read_note(certificate)
     return {
         "network": one.checkpoint.name,
         "family": family.name,
@@ -116,7 +117,7 @@ def _row(one: Trained, certificate: Path, config: FollowStudyConfig) -> dict[str
         "weight": family.weight,
         "effective_weight": settings(family, one.seed, config).safety.weight,
         "seed": one.seed,
-        **stages.read_note(one.folder),
+        **read_note(one.folder),
         **{name: judged[name] for name in ("domains", "certified", "violated", "unknown", "error", "min_margin")},
     }
 
@@ -125,7 +126,7 @@ def _worst_checks(trained: Sequence[Trained], checks: Sequence[Path]) -> dict[st
     """Median and worst share of each check over the networks of a family."""
     shares: dict[str, dict[str, list[float]]] = {}
     for one, folder in zip(trained, checks, strict=True):
-        for name, rate in stages.read_note(folder).items():
+        for name, rate in read_note(folder).items():
             shares.setdefault(one.family.name, {}).setdefault(name, []).append(rate["share"])
     return {
         family: {
