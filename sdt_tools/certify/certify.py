@@ -78,7 +78,7 @@ class _Bound:
 
     margin: float = 0.0
     loss: float = 0.0
-    winner: MotionClass = MotionClass.STAY
+    winner: MotionClass | None = None
     error: str = ""
 
 
@@ -136,12 +136,13 @@ def _bounds(network: FollowNet, boxes: DomainSet) -> list[_Bound]:
         if len(boxes) == 1:
             return [_Bound(error=f"{type(error).__name__}: {error}")]
         return [_bounds(network, _part(boxes, [domain]))[0] for domain in range(len(boxes))]
-    winners = differences.amin(dim=2).argmax(dim=1).tolist()
-    numbers = zip(worst_margins(differences).tolist(), worst_case_loss(differences).tolist(), winners, strict=True)
+    alone, winners = differences.amin(dim=2).max(dim=1)
+    certain = [kept[winner] if margin > 0.0 else None for margin, winner in zip(alone.tolist(), winners, strict=True)]
+    numbers = zip(worst_margins(differences).tolist(), worst_case_loss(differences).tolist(), certain, strict=True)
     finite = differences.isfinite().flatten(1).all(dim=1).tolist()
     ordered = np.all(boxes.lower_m <= boxes.upper_m, axis=1).tolist()
     return [
-        _checked(_Bound(margin, loss, MotionClass(kept[winner])), finite[domain], ordered[domain])
+        _checked(_Bound(margin, loss, None if winner is None else MotionClass(winner)), finite[domain], ordered[domain])
         for domain, (margin, loss, winner) in enumerate(numbers)
     ]
 

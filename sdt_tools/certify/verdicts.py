@@ -48,7 +48,8 @@ class CertifyConfig(Config):
 class DomainVerdict:
     """One domain of one set, and what was found.
 
-    ``margin`` is the provable one: by how many logits the class ``winner`` beats every forbidden one at worst.
+    ``margin`` is the provable one: by how many logits each forbidden class is beaten at worst. ``winner`` is the class
+    that provably beats them all, where there is such a one.
     ``bound_loss`` is the worst-case loss. ``method`` names what the verdict rests on: ``ibp``, ``pgd`` (a search, with
     which the domain's two extreme scans are tried), or both where neither decided. ``violation`` is the best forbidden
     logit minus the best allowed one, in float64, at the worst scan found, and ``answer`` what the float32 network says

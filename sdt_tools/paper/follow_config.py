@@ -59,7 +59,7 @@ class FollowStudyConfig(Config):
     paper_data: DatasetConfig = DatasetConfig(train_frames=TRAINING_FRAMES, val_frames=VALIDATION_FRAMES)
     large_data: DatasetConfig = DatasetConfig(train_frames=40_000, val_frames=8_000, per_recording_cap=70)
     large_epochs: int = Field(default=30, ge=1)
-    large_architecture: FollowNetConfig = FollowNetConfig(widths=(20, 28, 40, 56, 56, 56, 56), hidden=96, dropout=0.2)
+    large_architecture: FollowNetConfig = FollowNetConfig(widths=(16, 32, 48, 64, 64, 64, 64), hidden=96, dropout=0.2)
     paper_epochs: int = Field(default=80, ge=1)
     first_reported_seed: int = Field(default=1000, ge=1000)
     runs: int = Field(default=20, ge=1)

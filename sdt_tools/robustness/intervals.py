@@ -68,16 +68,17 @@ def worst_case_loss(differences: Float[Tensor, "boxes allowed forbidden"]) -> Fl
 
 
 def worst_margins(differences: Float[Tensor, "boxes allowed forbidden"]) -> Float[Tensor, "boxes"]:
-    """By how many logits the best allowed class provably beats every forbidden one; negative where none does.
+    """By how many logits each forbidden class is provably beaten by some allowed one, at least; negative if one is not.
 
-    There has to be a class of each kind.
+    It need not be the same class that beats all: where every forbidden logit is below some other one, the largest is
+    an allowed class's. There has to be a class of each kind.
     """
-    return differences.amin(dim=2).amax(dim=1)
+    return differences.amax(dim=1).amin(dim=1)
 
 
 def certified(differences: Float[Tensor, "boxes allowed forbidden"], margin: float = MARGIN) -> Bool[Tensor, "boxes"]:
-    """In which boxes some allowed class provably beats every forbidden one by more than ``margin``; never for NaN."""
-    return (differences > margin).all(dim=2).any(dim=1)
+    """In which boxes every forbidden class is provably beaten by more than ``margin``; never for NaN."""
+    return worst_margins(differences) > margin
 
 
 def domain_differences(network: FollowNet, boxes: DomainSet) -> Float64[np.ndarray, "domains allowed forbidden"]:

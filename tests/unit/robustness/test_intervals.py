@@ -216,15 +216,34 @@ def test_descending_the_loss_certifies_a_small_network() -> None:
     assert certified(difference_bounds(layers, lower, upper, NOT_FORWARD)).all()
 
 
-def test_one_allowed_class_has_to_beat_all_forbidden_ones() -> None:
-    each_beats_another = torch.full((1, 4, 3), 5.0)
-    for row in range(4):
-        each_beats_another[0, row, row % 3] = -1.0
-    one_beats_all = torch.full((1, 4, 3), -5.0)
-    one_beats_all[0, 2] = 0.5
-    differences = torch.cat([each_beats_another, one_beats_all])
-    assert certified(differences).tolist() == [False, True]
-    assert worst_margins(differences).tolist() == [-1.0, 0.5]
+def test_each_forbidden_class_has_to_be_beaten_by_some_allowed_one() -> None:
+    each_by_another = torch.full((1, 4, 3), -5.0)
+    each_by_another[0, [0, 1, 3], [0, 1, 2]] = torch.tensor([2.0, 0.25, 1.0])
+    all_by_one = torch.full((1, 4, 3), -5.0)
+    all_by_one[0, 2] = 0.5
+    one_by_none = torch.full((1, 4, 3), 5.0)
+    one_by_none[0, :, 1] = -1.0
+    differences = torch.cat([each_by_another, all_by_one, one_by_none])
+    assert certified(differences).tolist() == [True, True, False]
+    assert worst_margins(differences).tolist() == [0.25, 0.5, -1.0]
+
+
+def test_a_domain_in_which_different_allowed_classes_win_is_certified_and_keeps_its_promise() -> None:
+    """One allowed logit falls along the ray, another rises, and a forbidden one runs below each of the two."""
+    layers = nn.Sequential(nn.Linear(1, 7)).double()
+    with torch.no_grad():
+        layers[0].weight[:] = 0.0
+        layers[0].bias[:] = -3.0
+        layers[0].weight[0], layers[0].bias[0] = -1.0, -1.5
+        layers[0].weight[4], layers[0].bias[4] = 1.0, -1.5
+        layers[0].weight[FORBIDDEN[0]] = -1.0
+        layers[0].weight[FORBIDDEN[1]] = 1.0
+    lower, upper = torch.tensor([[-1.0]]).double(), torch.tensor([[1.0]]).double()
+    bound = difference_bounds(layers, lower, upper, NOT_FORWARD)
+    assert certified(bound).all()
+    assert (bound.amin(dim=2) < 0.0).all()
+    answers = layers(torch.linspace(-1.0, 1.0, 201).double()[:, None]).argmax(dim=1)
+    assert not set(answers.tolist()) & set(FORBIDDEN)
 
 
 def test_winning_by_the_margin_is_not_enough_and_nan_never_is() -> None:
