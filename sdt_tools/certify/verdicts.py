@@ -17,9 +17,9 @@ from sdt_tools.robustness.intervals import MARGIN
 class Verdict(StrEnum):
     """What is known of a domain.
 
-    ``certified``: bounds prove that one allowed class beats every forbidden one in all its scans. ``violated``: one of
-    its scans is known that is answered with a forbidden class. ``unknown``: neither. ``error``: it could not be found
-    out; the reason is kept.
+    ``certified``: bounds prove that every forbidden class is beaten by some allowed one in all its scans. ``violated``:
+    one of its scans is known that is answered with a forbidden class. ``unknown``: neither. ``error``: it could not be
+    found out; the reason is kept.
     """
 
     CERTIFIED = "certified"

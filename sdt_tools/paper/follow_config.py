@@ -47,6 +47,8 @@ class AggregationConfig(Config):
 class FollowStudyConfig(Config):
     """The study's sizes. Practice and training seeds lie below 1,000, reported ones from ``first_reported_seed`` on.
 
+    Those right after 1,000 were looked at while the settings were chosen; 2,000 is the first that was not.
+
     ``paper_data`` is of the paper's size, drawn anew for each training seed from the expert's recordings in practice
     worlds; ``large_data`` is drawn once from everything, and read by networks of ``large_architecture``, the same nine
     layers but wider: the narrow one does not take in so much. ``swept_weights`` are values of λ beside the recipe's,
@@ -61,7 +63,7 @@ class FollowStudyConfig(Config):
     large_epochs: int = Field(default=30, ge=1)
     large_architecture: FollowNetConfig = FollowNetConfig(widths=(16, 32, 48, 64, 64, 64, 64), hidden=96, dropout=0.2)
     paper_epochs: int = Field(default=80, ge=1)
-    first_reported_seed: int = Field(default=1000, ge=1000)
+    first_reported_seed: int = Field(default=2000, ge=1000)
     runs: int = Field(default=20, ge=1)
     evaluation: ClosedLoopConfig = ClosedLoopConfig()
     swept_weights: tuple[float, ...] = (0.1, 0.3, 3.0)

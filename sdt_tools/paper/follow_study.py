@@ -20,7 +20,7 @@ from sdt_tools.paper.follow_tables import FollowTables
 from sdt_tools.paper.judging_stages import certify_stage, check_stage
 from sdt_tools.paper.stage_folders import read_note
 from sdt_tools.runs.local import run_units
-from sdt_tools.runs.unit import Unit, execute
+from sdt_tools.runs.unit import Unit
 from sdt_tools.scene.scenario import STANDARD_FOLLOW
 
 _LOW_IS_GOOD: Final = re.compile("pasted|flipped|loss")
@@ -44,9 +44,8 @@ def run_follow_study(out: Path, config: FollowStudyConfig, workers: int, progres
     )
     sweep = train_models(out, dict.fromkeys(swept(config), config.sweep_seeds), *data, config, workers, progress)
     trained = [*driven, *sweep]
-    certificates = _certify(out, trained, config, workers, progress)
+    searched, *certificates = _certify(out, trained, config, workers, progress)
     checks = _check(out, driven, large_data, workers, progress)
-    searched = _search_hard(out, driven, config, progress)
     known = pl.DataFrame(
         {
             "policy": [f"policy:{one.checkpoint.name}" for one in driven],
@@ -59,7 +58,7 @@ def run_follow_study(out: Path, config: FollowStudyConfig, workers: int, progres
         networks=pl.DataFrame([_row(*one, config) for one in zip(trained, certificates, strict=True)]),
         runs=pl.read_parquet(evaluation.runs).join(known, on="policy"),
         traces=pl.read_parquet(evaluation.traces).join(known, on="policy"),
-        searched=searched,
+        searched=read_note(searched),
         checks=_worst_checks(driven, checks),
         real_time_factor=evaluation.real_time_factor,
     )
@@ -71,8 +70,19 @@ def run_follow_study(out: Path, config: FollowStudyConfig, workers: int, progres
 def _certify(
     out: Path, trained: Sequence[Trained], config: FollowStudyConfig, workers: int, progress: StageProgress
 ) -> list[Path]:
-    """Each network at its own level; those of level 0 at level 3, where violations are to be found."""
+    """First what is searched with many restarts: one network of level 4 on the larger data. Then each network.
+
+    Networks are judged at their own level; those of level 0 at level 3, where violations are to be found.
+    """
+    hard = next(one for one in trained if one.family == Family("large", "gate", 4))
     units = [
+        Unit(
+            f"searched/{hard.checkpoint.name}",
+            certify_stage,
+            {"model": hard.checkpoint, "level": 4, "config": config.searched_hard},
+        )
+    ]
+    units += [
         Unit(
             f"certificates/{one.checkpoint.name}",
             certify_stage,
@@ -81,20 +91,6 @@ def _certify(
         for one in trained
     ]
     return run_units(units, out, workers, partial(progress, "certificates"))
-
-
-def _search_hard(
-    out: Path, trained: Sequence[Trained], config: FollowStudyConfig, progress: StageProgress
-) -> dict[str, object]:
-    """The first network of level 4 on the larger data, its certified domains searched with many restarts."""
-    one = next(one for one in trained if one.family == Family("large", "gate", 4))
-    progress("hard search", 0, 1)
-    unit = Unit(
-        f"searched/{one.checkpoint.name}",
-        certify_stage,
-        {"model": one.checkpoint, "level": 4, "config": config.searched_hard},
-    )
-    return read_note(execute(unit, out))
 
 
 def _check(out: Path, trained: Sequence[Trained], data: Path, workers: int, progress: StageProgress) -> list[Path]:
