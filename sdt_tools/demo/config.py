@@ -7,6 +7,8 @@ from sdt_tools.dataset.config import DatasetConfig
 from sdt_tools.error_analysis.definitions import ErrorOptions
 from sdt_tools.evaluation.closed_loop import ClosedLoopConfig
 from sdt_tools.training.follow import FollowTrainingConfig
+from sdt_tools.training.recipes import recipe_for
+from sdt_tools.training.specification import SpecificationConfig
 
 
 class DemoConfig(Config):
@@ -27,7 +29,7 @@ class DemoConfig(Config):
     closed_loop_runs: int = Field(default=20, ge=1)
     scenario: str = "plain"
     dataset: DatasetConfig = DatasetConfig(train_frames=2705, val_frames=570)
-    training: FollowTrainingConfig = FollowTrainingConfig()
+    training: FollowTrainingConfig = recipe_for(SpecificationConfig(), "plain")
     evaluation: ClosedLoopConfig = ClosedLoopConfig()
     errors: ErrorOptions = ErrorOptions()
 
