@@ -42,7 +42,9 @@ def runs_figure(runs: pl.DataFrame, traces: pl.DataFrame, scenario: str, title: 
         _draw_run(panel, traces.filter(pl.col("seed") == run["seed"]), run["outcome"])
         panel.set_title(f"{run['seed']}: {run['outcome']}, {run['simulated_s']:.0f} s", fontsize=8)
     figure.suptitle(title, fontsize=11)
-    figure.legend(handles=_legend(set(runs["outcome"])), loc="outside lower center", ncols=6, fontsize=8, frameon=False)
+    end = Line2D([], [], color="#495057", marker="x", linestyle="", label="operator's end")
+    handles = [*_legend(set(runs["outcome"])), end]
+    figure.legend(handles=handles, loc="outside lower center", ncols=6, fontsize=8, frameon=False)
     figure.savefig(out, dpi=90)
 
 
@@ -100,5 +102,4 @@ def _legend(outcomes: set[str]) -> list[Line2D]:
         if name in outcomes
     ]
     operator = Line2D([], [], color="#adb5bd", linestyle="--", label="operator")
-    end = Line2D([], [], color="#495057", marker="x", linestyle="", label="his end")
-    return [*robot, operator, end]
+    return [*robot, operator]
