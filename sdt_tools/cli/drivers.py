@@ -5,7 +5,7 @@ from pathlib import Path
 from sdt_tools.errors import UsageError
 from sdt_tools.frames import motion_labelled
 from sdt_tools.protocols import Driver
-from sdt_tools.recording.drivers import ConstantDriver, ExpertDriver
+from sdt_tools.recording.live.drivers import ConstantDriver, ExpertDriver
 from sdt_tools.scene.source import SceneSource
 
 FORMS = "expert, constant:CLASS or policy:MODEL_DIR"

@@ -26,7 +26,7 @@ def lidar_csv(
 
     Only the scans are taken: state and steering have no topic in a recording. Stamps start at 2025-01-01.
     """
-    from sdt_tools.recording.import_csv import import_lidar_csv
+    from sdt_tools.recording.exchange.lidar_csv import import_lidar_csv
 
     summary = import_lidar_csv(file, out, hz)
     if json_output:

@@ -8,7 +8,7 @@ import typer
 from sdt_tools.cli.console import JsonFlag, console, emit
 
 if TYPE_CHECKING:
-    from sdt_tools.recording.loop import RecordingSummary
+    from sdt_tools.recording.live.loop import RecordingSummary
 
 app = typer.Typer(no_args_is_help=True, help="Record scans, images, poses and commands in step into one MCAP file.")
 
@@ -45,8 +45,8 @@ def scene(
     from sdt_tools.cli.drivers import make_driver
     from sdt_tools.cli.recording_progress import recording_progress
     from sdt_tools.config import load_config, parse_config
-    from sdt_tools.recording.perturb import PerturbConfig
-    from sdt_tools.recording.scene_session import SceneRecordingConfig, record_scene
+    from sdt_tools.recording.live.perturb import PerturbConfig
+    from sdt_tools.recording.live.scene_session import SceneRecordingConfig, record_scene
     from sdt_tools.scene.config import SceneConfig
 
     values = {

@@ -6,8 +6,8 @@ from contextlib import contextmanager
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 
 from sdt_tools.cli.console import console
-from sdt_tools.recording.loop import RecordingProgress
-from sdt_tools.recording.topics import CAMERA_IMAGE, LIDAR_SCAN
+from sdt_tools.recording.live.loop import RecordingProgress
+from sdt_tools.recording.messages.topics import CAMERA_IMAGE, LIDAR_SCAN
 
 _SHOWN = {LIDAR_SCAN: "scans", CAMERA_IMAGE: "images"}
 

@@ -22,8 +22,8 @@ from sdt_tools.evaluation.evaluate import EvaluationSummary, evaluate_follow
 from sdt_tools.evaluation.figure import runs_figure
 from sdt_tools.evaluation.saving import SaveRuns
 from sdt_tools.frames import MotionClass
-from sdt_tools.recording.perturb import PerturbConfig
-from sdt_tools.recording.scene_session import SceneRecordingConfig
+from sdt_tools.recording.live.perturb import PerturbConfig
+from sdt_tools.recording.live.scene_session import SceneRecordingConfig
 from sdt_tools.runs.local import run_units
 from sdt_tools.runs.unit import Unit, execute
 

@@ -17,9 +17,9 @@ from sdt_tools.labeling.resolve import resolve
 from sdt_tools.labeling.vocabulary import LabelKind, LabelSource, journal_path
 from sdt_tools.models.checkpoint import load_checkpoint
 from sdt_tools.protocols import Driver
-from sdt_tools.recording.drivers import ExpertDriver
-from sdt_tools.recording.scene_session import SceneRecordingConfig, record_scene
-from sdt_tools.recording.topics import LIDAR_SCAN
+from sdt_tools.recording.live.drivers import ExpertDriver
+from sdt_tools.recording.live.scene_session import SceneRecordingConfig, record_scene
+from sdt_tools.recording.messages.topics import LIDAR_SCAN
 from sdt_tools.replay.predictions import scan_predictions
 from sdt_tools.replay.replay import replay
 from sdt_tools.robustness.conflicts import conflict_check

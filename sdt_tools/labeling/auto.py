@@ -13,9 +13,9 @@ from sdt_tools.frames import CameraImage, Mode, MotionCommand, OperatorState
 from sdt_tools.labeling.journal import Journal
 from sdt_tools.labeling.resolve import standing
 from sdt_tools.labeling.vocabulary import LabelKind, LabelSource, journal_path
-from sdt_tools.recording.perturb import PERTURBATION
+from sdt_tools.recording.live.perturb import PERTURBATION
+from sdt_tools.recording.messages.topics import CAMERA_IMAGE, COMMAND, OPERATOR_STATE
 from sdt_tools.recording.reader import Recording
-from sdt_tools.recording.topics import CAMERA_IMAGE, COMMAND, OPERATOR_STATE
 
 AutoSource = Literal[LabelSource.COMMAND, LabelSource.TRUTH]
 TRUTH_LABELER: Final = "scene"

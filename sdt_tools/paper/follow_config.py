@@ -8,7 +8,7 @@ from sdt_tools.dataset.config import DatasetConfig
 from sdt_tools.evaluation.closed_loop import ClosedLoopConfig
 from sdt_tools.models.follow_net import FollowNetConfig
 from sdt_tools.paper.printed import TRAINING_FRAMES, VALIDATION_FRAMES
-from sdt_tools.recording.perturb import PerturbConfig
+from sdt_tools.recording.live.perturb import PerturbConfig
 from sdt_tools.robustness.attacks import AttackConfig
 from sdt_tools.scene.config import SceneConfig
 

@@ -11,7 +11,7 @@ from sdt_tools.paper.follow_config import FollowStudyConfig
 from sdt_tools.paper.recording_stages import finished_courses_stage, record_stage
 from sdt_tools.paper.stage_folders import read_note
 from sdt_tools.paper.training_stage import train_stage
-from sdt_tools.recording.scene_session import SceneRecordingConfig
+from sdt_tools.recording.live.scene_session import SceneRecordingConfig
 from sdt_tools.robustness.domains import SafetyLevel
 from sdt_tools.runs.local import run_units
 from sdt_tools.runs.unit import Unit, execute

@@ -12,8 +12,8 @@ from sdt_tools.labeling.vocabulary import LabelKind, LabelSource
 from sdt_tools.models.checkpoint import load_checkpoint
 from sdt_tools.paper.stage_folders import LABELS, RECORDINGS, write_note
 from sdt_tools.protocols import Driver
-from sdt_tools.recording.drivers import ExpertDriver
-from sdt_tools.recording.scene_session import SceneRecordingConfig, record_scene
+from sdt_tools.recording.live.drivers import ExpertDriver
+from sdt_tools.recording.live.scene_session import SceneRecordingConfig, record_scene
 from sdt_tools.scene.practice_courses import NAME as PRACTICE_COURSE
 from sdt_tools.scene.scenario import layout_for
 from sdt_tools.scene.source import SceneSource

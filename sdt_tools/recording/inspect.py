@@ -5,7 +5,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from sdt_tools.clock import SECOND_NS
-from sdt_tools.recording.reader import Damage, Recording
+from sdt_tools.recording.container.reader import Damage
+from sdt_tools.recording.reader import Recording
 from sdt_tools.recording.summary import TopicSummary
 
 

@@ -10,10 +10,10 @@ from jaxtyping import Float64, Int64
 
 from sdt_tools.errors import RecordingError
 from sdt_tools.frames import RAYS, LidarScan, Received
+from sdt_tools.recording.messages.topics import LIDAR_SCAN
+from sdt_tools.recording.messages.wire import decode_scan
 from sdt_tools.recording.scan_kernel import copy_rows, find_messages, find_ranges
 from sdt_tools.recording.series import ScanSeries, empty_series
-from sdt_tools.recording.topics import LIDAR_SCAN
-from sdt_tools.recording.wire import decode_scan
 
 ROW_BYTES: Final = RAYS * 8
 

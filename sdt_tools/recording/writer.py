@@ -17,9 +17,10 @@ from sdt_tools.clock import FAST_EPOCH_NS, SECOND_NS
 from sdt_tools.errors import RecordingError
 from sdt_tools.frames import CameraImage, Received
 from sdt_tools.protocols import SourceInfo
-from sdt_tools.recording.codec import encode
-from sdt_tools.recording.container import CHUNK_BYTES, McapFile
-from sdt_tools.recording.schemas import schema_data
+from sdt_tools.recording.container.file import CHUNK_BYTES, McapFile
+from sdt_tools.recording.messages.codec import encode
+from sdt_tools.recording.messages.schemas import schema_data
+from sdt_tools.recording.messages.topics import topic_of
 from sdt_tools.recording.session import (
     CONFIG_MEDIA_TYPE,
     CONFIG_NAME,
@@ -29,7 +30,6 @@ from sdt_tools.recording.session import (
     derived_id,
     session_metadata,
 )
-from sdt_tools.recording.topics import topic_of
 
 FLUSH_NS: Final = SECOND_NS // 2
 SYNC_NS: Final = SECOND_NS

@@ -18,8 +18,8 @@ from sdt_tools.config import Config
 from sdt_tools.errors import LabelError, OutputExistsError, RecordingError, UsageError
 from sdt_tools.labeling.resolve import read_labels
 from sdt_tools.labeling.vocabulary import LabelKind, journal_path
+from sdt_tools.recording.messages.topics import LIDAR_SCAN
 from sdt_tools.recording.reader import Recording
-from sdt_tools.recording.topics import LIDAR_SCAN
 from sdt_tools.replay.predictions import CLASSES_KEY, FORMAT_KEY, FORMAT_VERSION, SCHEMA
 from sdt_tools.replay.rows import CLASSES, NO_LABELS, MotionModel, predict_recording
 from sdt_tools.runs.code import code_version

@@ -7,8 +7,8 @@ import numpy as np
 from jaxtyping import Bool, Float64, Int64
 
 from sdt_tools.frames import LIDAR_AHEAD_M, MotionCommand, Odometry, OperatorPose, Pose2D
+from sdt_tools.recording.messages.topics import COMMAND, ODOMETRY, OPERATOR_POSE
 from sdt_tools.recording.reader import Recording
-from sdt_tools.recording.topics import COMMAND, ODOMETRY, OPERATOR_POSE
 
 POSE_HOLDS_NS: Final = 100_000_000
 """A pose is known at a stamp when it was measured within this time of it."""

@@ -13,8 +13,8 @@ import rerun as rr
 from sdt_tools.config import MotionConfig
 from sdt_tools.errors import OutputExistsError, UsageError
 from sdt_tools.frames import RAYS, CameraImage
+from sdt_tools.recording.messages.topics import CAMERA_IMAGE
 from sdt_tools.recording.reader import Recording
-from sdt_tools.recording.topics import CAMERA_IMAGE
 from sdt_tools.view.blueprint import Content, blueprint
 from sdt_tools.view.camera_view import send_images
 from sdt_tools.view.decisions import NOTHING_JUDGED, judge

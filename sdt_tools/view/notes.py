@@ -15,7 +15,7 @@ from sdt_tools.frames import (
     OperatorState,
     Received,
 )
-from sdt_tools.recording.topics import CAMERA_CALIBRATION, OPERATOR_STATE, SESSION_LOG, TRANSFORM
+from sdt_tools.recording.messages.topics import CAMERA_CALIBRATION, OPERATOR_STATE, SESSION_LOG, TRANSFORM
 from sdt_tools.view.geometry import Mount
 
 NOTE_TOPICS: Final = (OPERATOR_STATE, SESSION_LOG, TRANSFORM, CAMERA_CALIBRATION)

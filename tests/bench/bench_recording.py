@@ -16,8 +16,8 @@ from pytest_benchmark.fixture import BenchmarkFixture
 from sdt_tools.clock import FAST_EPOCH_NS
 from sdt_tools.frames import CameraImage, LidarScan, Received
 from sdt_tools.protocols import SourceInfo
+from sdt_tools.recording.messages.schemas import schema_data
 from sdt_tools.recording.reader import Recording
-from sdt_tools.recording.schemas import schema_data
 from sdt_tools.recording.writer import RecordingWriter
 
 INFO = SourceInfo("scene", "bench", 0)

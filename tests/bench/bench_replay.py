@@ -12,9 +12,9 @@ from sdt_tools.models.card import ModelCard
 from sdt_tools.models.follow_net import FollowNet, FollowNetConfig, new_follow_net
 from sdt_tools.models.loaded import LoadedModel
 from sdt_tools.models.preprocess import PreprocessConfig
-from sdt_tools.recording.drivers import ExpertDriver
+from sdt_tools.recording.live.drivers import ExpertDriver
+from sdt_tools.recording.live.scene_session import SceneRecordingConfig, record_scene
 from sdt_tools.recording.reader import Recording
-from sdt_tools.recording.scene_session import SceneRecordingConfig, record_scene
 from sdt_tools.replay.replay import replay
 from sdt_tools.replay.tracks import read_tracks
 

@@ -14,8 +14,8 @@ from pytest_benchmark.fixture import BenchmarkFixture
 from sdt_tools.clock import FAST_EPOCH_NS
 from sdt_tools.frames import CameraImage, LidarScan, Odometry, OperatorPose, Pose2D, Received, ray_angles_rad
 from sdt_tools.protocols import SourceInfo
+from sdt_tools.recording.messages.topics import CAMERA_IMAGE, LIDAR_SCAN
 from sdt_tools.recording.reader import Recording
-from sdt_tools.recording.topics import CAMERA_IMAGE, LIDAR_SCAN
 from sdt_tools.recording.writer import RecordingWriter
 from sdt_tools.view.log import write_rrd
 

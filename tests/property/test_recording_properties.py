@@ -33,11 +33,11 @@ from sdt_tools.frames import (
     Twist,
 )
 from sdt_tools.protocols import SourceInfo
-from sdt_tools.recording.codec import decode, encode
+from sdt_tools.recording.messages.codec import decode, encode
+from sdt_tools.recording.messages.topics import topic_of
+from sdt_tools.recording.messages.wire import decode_scan, varint
 from sdt_tools.recording.reader import Recording
 from sdt_tools.recording.scan_kernel import find_ranges
-from sdt_tools.recording.topics import topic_of
-from sdt_tools.recording.wire import decode_scan, varint
 from sdt_tools.recording.writer import RecordingWriter
 
 stamps = st.integers(0, 2**62)

@@ -19,11 +19,11 @@ from sdt_tools.frames import (
     Pose2D,
     Twist,
 )
-from sdt_tools.recording.codec import decode, encode
+from sdt_tools.recording.messages.codec import decode, encode
+from sdt_tools.recording.messages.schemas import message_class
+from sdt_tools.recording.messages.topics import TOPIC_BY_NAME, TOPICS, topic_of
+from sdt_tools.recording.messages.wire import varint
 from sdt_tools.recording.scan_kernel import find_ranges
-from sdt_tools.recording.schemas import message_class
-from sdt_tools.recording.topics import TOPIC_BY_NAME, TOPICS, topic_of
-from sdt_tools.recording.wire import varint
 
 
 def test_topics_and_schemas_are_those_of_the_format() -> None:

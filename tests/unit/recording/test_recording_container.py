@@ -15,7 +15,7 @@ from recording_samples import CONFIG, T0, image, one_of_each, parsed, read_by_mc
 
 from sdt_tools.errors import OutputExistsError
 from sdt_tools.frames import LidarScan
-from sdt_tools.recording.container import MAGIC, McapFile
+from sdt_tools.recording.container.file import MAGIC, McapFile
 
 
 def plain_records(path: Path) -> list[object]:

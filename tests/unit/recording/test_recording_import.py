@@ -9,7 +9,7 @@ from recording_samples import T0, read_by_mcap
 
 from sdt_tools.errors import OutputExistsError, RecordingError, UsageError
 from sdt_tools.frames import LogEntry
-from sdt_tools.recording.import_csv import import_lidar_csv
+from sdt_tools.recording.exchange.lidar_csv import import_lidar_csv
 from sdt_tools.recording.reader import Recording
 
 

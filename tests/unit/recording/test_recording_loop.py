@@ -13,9 +13,9 @@ from sdt_tools.config import MotionConfig, RateConfig
 from sdt_tools.errors import RecordingError, RunError
 from sdt_tools.frames import LogEntry, MotionClass, MotionCommand, Received, Twist
 from sdt_tools.protocols import Observation, SourceInfo
-from sdt_tools.recording.gaps import GapCounter
-from sdt_tools.recording.loop import Ending, RecordingProgress, RecordingSummary, record
-from sdt_tools.recording.perturb import Perturbation, PerturbConfig
+from sdt_tools.recording.live.gaps import GapCounter
+from sdt_tools.recording.live.loop import Ending, RecordingProgress, RecordingSummary, record
+from sdt_tools.recording.live.perturb import Perturbation, PerturbConfig
 from sdt_tools.recording.reader import Recording
 from sdt_tools.recording.writer import RecordingWriter
 

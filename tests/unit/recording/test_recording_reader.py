@@ -12,10 +12,10 @@ from recording_samples import CONFIG, T0, image, one_of_each, read_by_mcap, scan
 
 from sdt_tools.errors import RecordingError
 from sdt_tools.frames import CameraImage, LidarScan, Odometry, Pose2D, Received
-from sdt_tools.recording.codec import encode
+from sdt_tools.recording.messages.codec import encode
+from sdt_tools.recording.messages.schemas import schema_data
+from sdt_tools.recording.messages.topics import topic_of
 from sdt_tools.recording.reader import Recording
-from sdt_tools.recording.schemas import schema_data
-from sdt_tools.recording.topics import topic_of
 
 ODOMETRY = Received(T0, Odometry(T0, Pose2D(0.0, 0.0, 0.0)))
 DRIVE = [message for n in range(200) for message in (scan(n, delay_ns=3_000_000), image(n), ODOMETRY)]

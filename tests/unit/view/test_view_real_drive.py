@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from view_samples import rows
 
-from sdt_tools.recording.import_csv import import_lidar_csv
+from sdt_tools.recording.exchange.lidar_csv import import_lidar_csv
 from sdt_tools.view.log import write_rrd
 
 DATA = os.environ.get("SDT_DATA")

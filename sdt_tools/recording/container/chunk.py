@@ -2,7 +2,7 @@
 
 import struct
 import zlib
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Set
 from dataclasses import dataclass
 from typing import Final, NamedTuple
 
@@ -15,6 +15,7 @@ MAX_CHUNK_BYTES: Final = 1 << 30
 
 _LZ4_MOST: Final = 256
 """lz4 packs no more than 255 bytes into one."""
+_ZSTD_PART: Final = 1 << 20
 _RECORD_HEAD: Final = struct.Struct("<BQ")
 _CHUNK_HEAD: Final = struct.Struct("<BQQQQII")
 _MESSAGE_HEAD: Final = struct.Struct("<HIQQ")
@@ -41,9 +42,9 @@ class Segment:
     loose: bool = False
     cut: bool = False
 
-    def may_hold(self, channel_ids: frozenset[int]) -> bool:
+    def may_hold(self, channel_ids: Set[int]) -> bool:
         """Whether a message of one of these channels can be in it."""
-        return self.index_offsets is None or not channel_ids.isdisjoint(self.index_offsets)
+        return self.index_offsets is None or not channel_ids.isdisjoint(self.index_offsets.keys())
 
 
 class RawMessage(NamedTuple):
@@ -110,7 +111,7 @@ def _decompress(compression: str, data: memoryview, size: int, cut: bool) -> byt
         if compression == "lz4":
             return _unpack_lz4(data, size, cut)
         if compression == "zstd":
-            return zstandard.ZstdDecompressor().stream_reader(data).read(size)
+            return _unpack_zstd(data, size)
     except (RuntimeError, zstandard.ZstdError) as error:
         if cut:
             return b""
@@ -126,3 +127,13 @@ def _unpack_lz4(data: memoryview, size: int, cut: bool) -> bytes:
     else:
         unpacked = lz4.frame.LZ4FrameDecompressor().decompress(data, max_length=max(size, 1))
     return unpacked
+
+
+def _unpack_zstd(data: memoryview, size: int) -> bytes:
+    """At most ``size`` bytes, asked for in parts: no room is made for more than there is."""
+    with zstandard.ZstdDecompressor().stream_reader(data) as stream:
+        parts, left = [], size
+        while left and (part := stream.read(min(left, _ZSTD_PART))):
+            parts.append(part)
+            left -= len(part)
+    return b"".join(parts)

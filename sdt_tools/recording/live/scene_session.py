@@ -9,8 +9,8 @@ from pydantic import Field
 from sdt_tools.clock import FAST_EPOCH_NS, HostClock
 from sdt_tools.config import Config, dump_config
 from sdt_tools.protocols import Driver, Observer
-from sdt_tools.recording.loop import RecordingProgress, RecordingSummary, record
-from sdt_tools.recording.perturb import Perturbation, PerturbConfig
+from sdt_tools.recording.live.loop import RecordingProgress, RecordingSummary, record
+from sdt_tools.recording.live.perturb import Perturbation, PerturbConfig
 from sdt_tools.recording.session import random_id
 from sdt_tools.recording.writer import RecordingWriter
 from sdt_tools.scene.config import SceneConfig

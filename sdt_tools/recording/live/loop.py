@@ -11,10 +11,10 @@ from sdt_tools.config import MotionConfig, RateConfig
 from sdt_tools.errors import RunError, SdtError
 from sdt_tools.frames import LogEntry, LogLevel, Received, Twist
 from sdt_tools.protocols import Actuator, Driver, Expert, Observer, Source
-from sdt_tools.recording.decide import Deciders, DecisionLoop, Perturb
-from sdt_tools.recording.gaps import GapCounter
-from sdt_tools.recording.interrupt import Interrupt, deferred_interrupt
-from sdt_tools.recording.topics import CAMERA_IMAGE, LIDAR_SCAN, topic_of
+from sdt_tools.recording.live.decide import Deciders, DecisionLoop, Perturb
+from sdt_tools.recording.live.gaps import GapCounter
+from sdt_tools.recording.live.interrupt import Interrupt, deferred_interrupt
+from sdt_tools.recording.messages.topics import CAMERA_IMAGE, LIDAR_SCAN, topic_of
 from sdt_tools.recording.writer import RecordingWriter
 
 _PROGRESS_S: Final = 0.25

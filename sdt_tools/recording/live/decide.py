@@ -7,7 +7,7 @@ from sdt_tools.clock import SECOND_NS
 from sdt_tools.config import MotionConfig
 from sdt_tools.frames import CameraImage, LidarScan, Message, MotionClass, MotionCommand
 from sdt_tools.protocols import Driver, Expert, Observation
-from sdt_tools.recording.perturb import PERTURBATION
+from sdt_tools.recording.live.perturb import PERTURBATION
 
 Perturb = Callable[[MotionClass], MotionClass]
 """What to drive instead of a driver's choice."""

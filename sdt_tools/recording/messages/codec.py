@@ -33,9 +33,9 @@ from sdt_tools.frames import (
     Pose2D,
     Twist,
 )
-from sdt_tools.recording.schemas import message_class
-from sdt_tools.recording.topics import TOPIC_BY_NAME
-from sdt_tools.recording.wire import SECOND_NS, decode_scan, encode_image, encode_scan
+from sdt_tools.recording.messages.schemas import message_class
+from sdt_tools.recording.messages.topics import TOPIC_BY_NAME
+from sdt_tools.recording.messages.wire import SECOND_NS, decode_scan, encode_image, encode_scan
 
 _FOXGLOVE_FATAL: Final = 5
 EnumT = TypeVar("EnumT", bound=IntEnum)

@@ -1,0 +1,1 @@
+"""MCAP as a file format: records, chunks and indexes, whatever their messages mean."""

@@ -1,0 +1,235 @@
+"""An MCAP file of anyone's, read: streaming, memory-mapped, a chunk at a time.
+
+Whole files are read by their summary, files that were cut off as far as they go (``truncated``). A chunk that is
+damaged costs itself: what it held is missing, the rest is read, and ``damage`` names the interval.
+"""
+
+import contextlib
+import logging
+import mmap
+from collections.abc import Iterator, Mapping, Set
+from dataclasses import dataclass
+from functools import cached_property
+from io import BytesIO
+from itertools import pairwise
+from pathlib import Path
+from types import TracebackType
+from typing import Final, NamedTuple
+
+from mcap.data_stream import ReadDataStream
+from mcap.records import Attachment, Channel, Metadata, Schema
+
+from sdt_tools.errors import RecordingError
+from sdt_tools.recording.container.chunk import DamagedChunkError, Segment, read_segment, walk_messages
+from sdt_tools.recording.container.extents import Extent, indexed_extents
+from sdt_tools.recording.container.file import MAGIC
+from sdt_tools.recording.container.index import read_index
+from sdt_tools.recording.container.records import FileIndex
+
+_RECORD_HEAD_BYTES: Final = 9
+_log = logging.getLogger(__name__)
+
+
+@dataclass(frozen=True)
+class Damage:
+    """An interval of log time, both ends inclusive, in which messages are lost, and why."""
+
+    start_ns: int
+    end_ns: int
+    reason: str
+
+
+class RawEntry(NamedTuple):
+    """A message as it lies in the file. Entries sort by log time, then by their place in the file."""
+
+    log_ns: int
+    offset: int
+    start: int
+    end: int
+    publish_ns: int
+    channel_id: int
+    chunk: bytes | memoryview
+
+    @property
+    def data(self) -> bytes:
+        """A copy of what the message holds."""
+        return bytes(self.chunk[self.start : self.end])
+
+
+class McapReader:
+    """The records of an MCAP file, whatever they mean; close it, or use it in a ``with`` statement.
+
+    Raises RecordingError, saying what to do, for a path that is missing or not an MCAP.
+    """
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+        self._map = _map_file(path)
+        self._view = memoryview(self._map)
+        self._damage: dict[int, Damage] = {}
+        self._index: FileIndex = read_index(self._view)
+
+    def close(self) -> None:
+        """Let go of the file; may be called twice."""
+        self._view.release()
+        with contextlib.suppress(BufferError):  # an iterator still holds a chunk: the map goes when the iterator does
+            self._map.close()
+
+    def __enter__(self) -> "McapReader":
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None
+    ) -> None:
+        self.close()
+
+    @property
+    def size_bytes(self) -> int:
+        """The file's size."""
+        return len(self._view)
+
+    @property
+    def beginning(self) -> memoryview:
+        """The file's first megabyte."""
+        return self._view[: 1 << 20]
+
+    @property
+    def truncated(self) -> bool:
+        """Whether the file ends before its footer: a recording that was cut off, or is still being written."""
+        return self._index.truncated
+
+    @property
+    def damage(self) -> tuple[Damage, ...]:
+        """Stretches met so far that could not be read, in the order of their time."""
+        skipped = [Damage(gap.start_ns, gap.end_ns, gap.reason) for gap in self._index.gaps]
+        return tuple(sorted([*skipped, *self._damage.values()], key=lambda damage: damage.start_ns))
+
+    @property
+    def channels(self) -> Mapping[int, Channel]:
+        """The file's channels by number."""
+        return self._index.channels
+
+    @property
+    def metadata(self) -> tuple[Metadata, ...]:
+        """The metadata records in the order of the file; a name may come more than once."""
+        return tuple(self._index.metadata)
+
+    @property
+    def counts(self) -> Mapping[int, int] | None:
+        """Messages by channel, as the summary says; None where only counting would tell."""
+        return self._index.counts
+
+    def schema(self, channel: Channel) -> Schema | None:
+        """The schema of ``channel``, where it has one."""
+        return self._index.schemas.get(channel.schema_id)
+
+    def schema_name(self, channel: Channel) -> str:
+        """The name of the schema of ``channel``; empty where it has none."""
+        schema = self.schema(channel)
+        return "" if schema is None else schema.name
+
+    def attachments(self) -> Iterator[Attachment]:
+        """The attachments in the order of the file; those that are damaged are left out."""
+        for offset, length in self._index.attachments:
+            body = BytesIO(self._view[offset + _RECORD_HEAD_BYTES : offset + length])
+            with contextlib.suppress(Exception):  # the record class raises whatever its bytes lead it to
+                yield Attachment.read(ReadDataStream(body))
+
+    @cached_property
+    def extents(self) -> Mapping[int, Extent]:
+        """Number, first and last log time of the messages of each channel."""
+        if self._index.counts is not None:
+            counts = {number: self._index.counts.get(number, 0) for number in self.channels}
+            indexed = indexed_extents(self._view, self._index.segments, counts)
+            if indexed is not None:
+                return indexed
+        counted = {number: Extent() for number in self.channels}
+        for segment in self.segments():
+            for raw in walk_messages(self.unpacked(segment) or b""):
+                if raw.channel_id in counted:
+                    counted[raw.channel_id].add(1, raw.log_ns, raw.log_ns)
+        return counted
+
+    def entries(
+        self, channel_ids: Set[int] | None = None, start_ns: int | None = None, end_ns: int | None = None
+    ) -> Iterator[RawEntry]:
+        """Messages of some channels (of all without) logged in ``[start_ns, end_ns)``, in the order of their log time.
+
+        Messages of a channel that the file does not announce are left out.
+        """
+        wanted = frozenset(self.channels if channel_ids is None else channel_ids)
+        pending: list[RawEntry] = []
+        for segment in self.segments(wanted, start_ns, end_ns):
+            ready = 0
+            while ready < len(pending) and pending[ready].log_ns < segment.start_ns:
+                ready += 1
+            yield from pending[:ready]
+            pending = pending[ready:]
+            pending += self._entries(segment, wanted, start_ns, end_ns)
+            pending.sort()
+        yield from pending
+
+    def segments(
+        self, channel_ids: Set[int] | None = None, start_ns: int | None = None, end_ns: int | None = None
+    ) -> list[Segment]:
+        """Stretches of the file that may hold such messages, in the order of the time at which they begin."""
+        chosen = [
+            segment
+            for segment in self._index.segments
+            if (channel_ids is None or segment.may_hold(channel_ids))
+            and (start_ns is None or segment.end_ns >= start_ns)
+            and (end_ns is None or segment.start_ns < end_ns)
+        ]
+        return sorted(chosen, key=lambda segment: (segment.start_ns, segment.offset))
+
+    def unpacked(self, segment: Segment) -> bytes | memoryview | None:
+        """The records in ``segment``; None, a warning, and an entry in ``damage`` where they cannot be had."""
+        try:
+            return read_segment(self._view, segment)
+        except DamagedChunkError as error:
+            if segment.offset not in self._damage:
+                self._damage[segment.offset] = Damage(segment.start_ns, segment.end_ns, str(error))
+                _log.warning(
+                    "%s: a chunk is damaged: %s; messages from %d to %d ns are lost",
+                    self.path,
+                    error,
+                    segment.start_ns,
+                    segment.end_ns,
+                )
+            return None
+
+    def _entries(
+        self, segment: Segment, wanted: frozenset[int], start_ns: int | None, end_ns: int | None
+    ) -> Iterator[RawEntry]:
+        data = self.unpacked(segment)
+        if data is None:
+            return
+        for raw in walk_messages(data):
+            if raw.channel_id in wanted and _within(raw.log_ns, start_ns, end_ns):
+                yield RawEntry(raw.log_ns, segment.offset, raw.start, raw.end, raw.publish_ns, raw.channel_id, data)
+
+
+def overlapping(segments: list[Segment]) -> bool:
+    """Whether some of these, which are in the order of their beginning, overlap in time."""
+    return any(later.start_ns < earlier.end_ns for earlier, later in pairwise(segments))
+
+
+def _within(log_ns: int, start_ns: int | None, end_ns: int | None) -> bool:
+    return (start_ns is None or log_ns >= start_ns) and (end_ns is None or log_ns < end_ns)
+
+
+def _map_file(path: Path) -> mmap.mmap:
+    try:
+        with path.open("rb") as file:
+            head = file.read(len(MAGIC))
+            if not head:
+                raise RecordingError(f"{path}: is empty; nothing was recorded")
+            if head != MAGIC:
+                raise RecordingError(f"{path}: not an MCAP file; `sdt import` reads other formats")
+            return mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ)
+    except FileNotFoundError:
+        raise RecordingError(f"{path}: no such recording; check the path") from None
+    except IsADirectoryError:
+        raise RecordingError(f"{path}: is a folder; name the .mcap file in it") from None
+    except OSError as error:
+        raise RecordingError(f"{path}: cannot be read: {error.strerror}") from None

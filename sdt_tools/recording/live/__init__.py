@@ -1,0 +1,1 @@
+"""Recording as it happens: the loop, who drives, what is missing."""
