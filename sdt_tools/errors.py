@@ -4,6 +4,7 @@ SdtError                     exit 1: something failed
 ├── UsageError               exit 2: the call or its input is wrong
 │   ├── ConfigError          a configuration or scenario file
 │   ├── RecordingError       a file that is not, or not yet, one of our recordings
+│   │   └── DiskRefusedError a recording that its disk has no room for
 │   ├── LabelError           a label journal
 │   ├── DatasetError         a data set that cannot be built or used
 │   ├── CheckpointError      a model folder
@@ -34,6 +35,10 @@ class ConfigError(UsageError):
 
 class RecordingError(UsageError):
     """A recording is missing, damaged, or lacks what is asked of it."""
+
+
+class DiskRefusedError(RecordingError):
+    """The disk refuses what is to be recorded."""
 
 
 class LabelError(UsageError):

@@ -17,6 +17,7 @@ VERBS = (
     "demo",
     "record",
     "inspect",
+    "repair",
     "import",
     "label",
     "dataset",

@@ -14,7 +14,7 @@ from types import TracebackType
 from typing import Final
 
 from sdt_tools.clock import FAST_EPOCH_NS, SECOND_NS
-from sdt_tools.errors import RecordingError
+from sdt_tools.errors import DiskRefusedError, RecordingError
 from sdt_tools.frames import CameraImage, Received
 from sdt_tools.protocols import SourceInfo
 from sdt_tools.recording.container.file import CHUNK_BYTES, McapFile
@@ -72,6 +72,7 @@ class RecordingWriter:
         self._syncer = ThreadPoolExecutor(1, "recording-sync") if realtime else None
         self._sync: Future[None] | None = None
         self._closed = False
+        self._refused = False
         self._file = McapFile(path, SOFTWARE, chunk_bytes)
         try:
             self._file.add_metadata(SESSION, session_metadata(info, self.recording_id, operator, notes))
@@ -104,7 +105,11 @@ class RecordingWriter:
             )
         compress = not isinstance(message, CameraImage)  # JPEG does not compress
         self.counts[topic.name] += 1
-        self._file.add_message(channel_id, received.received_ns, message.stamp_ns, encode(message), compress)
+        try:
+            self._file.add_message(channel_id, received.received_ns, message.stamp_ns, encode(message), compress)
+        except DiskRefusedError:
+            self._refused = True
+            raise
         if self._realtime:
             self.keep_safe()
 
@@ -115,7 +120,11 @@ class RecordingWriter:
         now_ns = self._monotonic_ns()
         if now_ns - self._flushed_ns < FLUSH_NS:
             return
-        self._file.finish_chunks()
+        try:
+            self._file.finish_chunks()
+        except DiskRefusedError:
+            self._refused = True
+            raise
         self._flushed_ns = now_ns
         if now_ns - self._synced_ns >= SYNC_NS and (self._sync is None or self._sync.done()):
             self._check_sync()
@@ -127,7 +136,10 @@ class RecordingWriter:
         self._stats.update(stats)
 
     def close(self) -> None:
-        """Write ``sdt.stats`` and the summary, and close; may be called twice."""
+        """Write ``sdt.stats`` and the summary, and close; may be called twice.
+
+        Where the disk has no room for them, the last chunks are given up until there is: the file is always whole.
+        """
         if self._closed:
             return
         self._closed = True
@@ -135,20 +147,33 @@ class RecordingWriter:
             if self._syncer is not None:
                 self._syncer.shutdown(wait=True)
                 self._check_sync()
-            self._file.finish_chunks()
         finally:
-            self._finish()
+            try:
+                refusal = self._finish()
+            finally:
+                self._file.close()
+        if refusal is not None and not self._refused:
+            raise refusal
 
-    def _finish(self) -> None:
+    def _finish(self) -> DiskRefusedError | None:
+        """End the file; what the disk said where it refused, whether or not room was made then."""
+        refusal = None
+        while True:
+            try:
+                self._file.finish_chunks()
+                self._file.add_metadata(STATS, self._final_stats())
+                self._file.finish()
+            except DiskRefusedError as error:
+                refusal = refusal or error
+                if self._file.drop_last_chunk() or self._file.pending:
+                    continue
+            return refusal
+
+    def _final_stats(self) -> dict[str, str]:
         kept = self._file.counts
         lost = self.counts.total() - sum(kept.values())
         stats = {f"count.{topic}": str(count) for topic, count in kept.items()} | self._stats
-        if lost:
-            stats["lost"] = str(lost)
-        try:
-            self._file.add_metadata(STATS, stats)
-        finally:
-            self._file.close()
+        return stats | {"lost": str(lost)} if lost else stats
 
     def _check_sync(self) -> None:
         error = self._sync.exception() if self._sync is not None else None

@@ -9,6 +9,7 @@ already; both are finished together, so that whoever reads scans alone never tou
 import os
 import struct
 import zlib
+from collections import Counter
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from io import FileIO
@@ -34,7 +35,7 @@ from mcap.records import (
     SummaryOffset,
 )
 
-from sdt_tools.errors import OutputExistsError, RecordingError
+from sdt_tools.errors import DiskRefusedError, OutputExistsError, RecordingError
 
 MAGIC: Final = b"\x89MCAP0\r\n"
 CHUNK_BYTES: Final = 1 << 20
@@ -78,23 +79,23 @@ class _OpenChunk:
 class McapFile:
     """An MCAP file being written; the path must not exist.
 
-    Raises OutputExistsError for a path that does, RecordingError naming path and cause when the disk refuses. After
-    such a refusal the file is cut back to its last whole record, and ``close`` finishes it if there is room for that.
+    Raises OutputExistsError for a path that does, DiskRefusedError naming path and cause when the disk refuses. After
+    such a refusal the file is cut back to its last whole record; ``drop_last_chunk`` makes room for the file's end.
     """
 
     def __init__(self, path: Path, library: str, chunk_bytes: int = CHUNK_BYTES) -> None:
         self.path = path
         self._chunk_bytes = chunk_bytes
-        self._schemas: dict[str, Schema] = {}
-        self._channels: dict[str, Channel] = {}
+        self._schemas: dict[tuple[str, str, bytes], Schema] = {}
+        self._channels: list[Channel] = []
         self._sequences: list[int] = [0]
         self._chunks = (_OpenChunk(compressed=True), _OpenChunk(compressed=False))
         self._chunk_indexes: list[ChunkIndex] = []
+        self._chunk_counts: list[dict[int, int]] = []
         self._attachments: list[AttachmentIndex] = []
         self._metadata: list[MetadataIndex] = []
-        self._counts: dict[int, int] = {}
+        self._counts: Counter[int] = Counter()
         self._size = 0
-        self._closed = False
         self._file = _create(path)
         self._write(MAGIC + _record(Header("", library)))
 
@@ -111,20 +112,38 @@ class McapFile:
     @property
     def counts(self) -> dict[str, int]:
         """Messages in the file, by topic; those that wait are not among them."""
-        return {topic: self._counts.get(channel.id, 0) for topic, channel in sorted(self._channels.items())}
+        counts: Counter[str] = Counter()
+        for channel in self._channels:
+            counts[channel.topic] += self._counts[channel.id]
+        return dict(sorted(counts.items()))
 
-    def add_channel(self, topic: str, schema: str, schema_data: bytes) -> int:
-        """Announce a protobuf topic; the number to write its messages with."""
-        known = self._schemas.get(schema)
-        if known is None:
-            known = Schema(len(self._schemas) + 1, schema_data, "protobuf", schema)
-            self._write(_record(known))
-            self._schemas[schema] = known
-        channel = Channel(len(self._channels) + 1, topic, "protobuf", metadata={}, schema_id=known.id)
+    def add_channel(
+        self,
+        topic: str,
+        schema: str,
+        schema_data: bytes,
+        *,
+        schema_encoding: str = "protobuf",
+        encoding: str = "protobuf",
+        metadata: Mapping[str, str] | None = None,
+    ) -> int:
+        """Announce a topic; the number to write its messages with. An empty name and data are no schema."""
+        schema_id = self._schema_id(schema, schema_encoding, schema_data)
+        channel = Channel(len(self._channels) + 1, topic, encoding, metadata=dict(metadata or {}), schema_id=schema_id)
         self._write(_record(channel))
-        self._channels[topic] = channel
+        self._channels.append(channel)
         self._sequences.append(0)
         return channel.id
+
+    def _schema_id(self, name: str, encoding: str, data: bytes) -> int:
+        if not name and not data:
+            return 0
+        known = self._schemas.get((name, encoding, data))
+        if known is None:
+            known = Schema(len(self._schemas) + 1, data, encoding, name)
+            self._write(_record(known))
+            self._schemas[name, encoding, data] = known
+        return known.id
 
     def add_message(self, channel_id: int, log_ns: int, publish_ns: int, data: bytes, compress: bool = True) -> None:
         """Take a message into the open chunk; ``compress`` chooses which one."""
@@ -152,6 +171,21 @@ class McapFile:
             if chunk.parts:
                 self._write_chunk(chunk)
 
+    def drop_last_chunk(self) -> bool:
+        """Cut the file back to before its last chunk, and all that follows it; whether there was one.
+
+        What is dropped no longer counts. It is for a disk that has no room for the file's end.
+        """
+        if not self._chunk_indexes:
+            return False
+        self._size = self._chunk_indexes.pop().chunk_start_offset
+        self._counts.subtract(self._chunk_counts.pop())
+        self._metadata = [entry for entry in self._metadata if entry.offset < self._size]
+        self._attachments = [entry for entry in self._attachments if entry.offset < self._size]
+        os.ftruncate(self._file.fileno(), self._size)
+        self._file.seek(self._size)
+        return True
+
     def sync(self) -> None:
         """Have the disk keep what was handed over: from here on it survives a power cut.
 
@@ -159,21 +193,18 @@ class McapFile:
         """
         os.fsync(self._file.fileno())
 
-    def close(self) -> None:
-        """Finish the chunks, write summary and footer, and close; may be called twice."""
-        if self._closed:
-            return
-        self._closed = True
+    def finish(self) -> None:
+        """Write what is pending, the summary and the footer. After a refusal it may be called again."""
+        self.finish_chunks()
+        self._write(self._end())
         try:
-            try:
-                self.finish_chunks()
-            finally:
-                self._write(self._end())
             os.fsync(self._file.fileno())
         except OSError as error:
             raise self._refused(error) from None
-        finally:
-            self._file.close()
+
+    def close(self) -> None:
+        """Let go of the file; may be called twice. Without ``finish`` it is left as one that was cut off."""
+        self._file.close()
 
     def _write_chunk(self, chunk: _OpenChunk) -> None:
         plain = b"".join(chunk.parts)
@@ -203,8 +234,9 @@ class McapFile:
                 uncompressed_size=len(plain),
             )
         )
-        for channel_id, entries in chunk.indexes.items():
-            self._counts[channel_id] = self._counts.get(channel_id, 0) + len(entries) // _INDEX_ENTRY.size
+        counts = {channel_id: len(entries) // _INDEX_ENTRY.size for channel_id, entries in chunk.indexes.items()}
+        self._chunk_counts.append(counts)
+        self._counts.update(counts)
 
     def _end(self) -> bytes:
         data_end = _record(DataEnd(0))
@@ -231,11 +263,11 @@ class McapFile:
             chunk_count=len(chunks),
             message_start_time=min((chunk.message_start_time for chunk in chunks), default=0),
             message_end_time=max((chunk.message_end_time for chunk in chunks), default=0),
-            channel_message_counts=dict(sorted(self._counts.items())),
+            channel_message_counts={channel: count for channel, count in sorted(self._counts.items()) if count},
         )
         return [
-            list(self._schemas.values()),
-            list(self._channels.values()),
+            [*self._schemas.values()],
+            [*self._channels],
             [statistics],
             list(chunks),
             list(self._attachments),
@@ -257,8 +289,8 @@ class McapFile:
         self._size += sum(map(len, parts))
         return offset
 
-    def _refused(self, error: OSError) -> RecordingError:
-        return RecordingError(
+    def _refused(self, error: OSError) -> DiskRefusedError:
+        return DiskRefusedError(
             f"{self.path}: cannot be written after {self._size / 1e6:.1f} MB: {error.strerror}; "
             "make room on that disk or record elsewhere (what was written before is kept)"
         )

@@ -102,6 +102,8 @@ class McapReader:
     def damage(self) -> tuple[Damage, ...]:
         """Stretches met so far that could not be read, in the order of their time."""
         skipped = [Damage(gap.start_ns, gap.end_ns, gap.reason) for gap in self._index.gaps]
+        if bytes(self._view[: len(MAGIC)]) != MAGIC:
+            skipped.append(Damage(0, 0, "the file's first bytes are not those of an MCAP; nothing is lost by that"))
         return tuple(sorted([*skipped, *self._damage.values()], key=lambda damage: damage.start_ns))
 
     @property
@@ -218,13 +220,18 @@ def _within(log_ns: int, start_ns: int | None, end_ns: int | None) -> bool:
     return (start_ns is None or log_ns >= start_ns) and (end_ns is None or log_ns < end_ns)
 
 
+def _nearly_magic(head: bytes) -> bool:
+    """Whether these are an MCAP's first bytes, one of them damaged at most."""
+    return len(head) == len(MAGIC) and sum(a != b for a, b in zip(head, MAGIC, strict=True)) <= 1
+
+
 def _map_file(path: Path) -> mmap.mmap:
     try:
         with path.open("rb") as file:
             head = file.read(len(MAGIC))
             if not head:
                 raise RecordingError(f"{path}: is empty; nothing was recorded")
-            if head != MAGIC:
+            if not _nearly_magic(head):
                 raise RecordingError(f"{path}: not an MCAP file; `sdt import` reads other formats")
             return mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ)
     except FileNotFoundError:

@@ -21,8 +21,9 @@ _CHUNK_FIXED: Final = _CHUNK_HEAD.size + 8  # and the name of the compression
 _MESSAGE_FIXED: Final = 22
 _RUN_BYTES: Final = 1 << 20
 _KNOWN: Final = frozenset(Opcode)
-_CHUNK: Final = re.compile(rb"\x06(?=.{5}\0{3}.{28}(?:\0{4}|\x03\0{3}lz4|\x04\0{3}zstd))", re.DOTALL)
-_MESSAGE: Final = re.compile(rb"\x05(?=.{4}\0{4})", re.DOTALL)
+_RECORD: Final = re.compile(rb"[\x01-\x0f](?=.{4}\0{4})", re.DOTALL)
+_CHAIN: Final = 3
+"""So many records in a row are no coincidence; nor is a chunk, whose lengths have to agree."""
 
 
 def walk(view: memoryview) -> FileIndex:
@@ -45,7 +46,8 @@ class _Walk:
             opcode, length = HEAD.unpack_from(view, at)
             body, end = at + HEAD.size, at + HEAD.size + length
             if not self._is_record(opcode, body, length):
-                found = self._next_record(before + 1)
+                # the length of the record before may be what is damaged; a chunk's has been checked
+                found = self._next_record(at if view[before] == Opcode.CHUNK else before + 1)
                 if found is None:
                     self._cut(opcode, body)
                     break
@@ -96,28 +98,32 @@ class _Walk:
         """Note that nothing could be read up to ``found``."""
         self._settle()
         opcode, _ = HEAD.unpack_from(self._view, found)
-        times_at = found + HEAD.size + (0 if opcode == Opcode.CHUNK else 6)
-        next_ns = int.from_bytes(self._view[times_at : times_at + 8], "little")
-        self.index.gaps.append(Gap(min(self._last_ns or next_ns, next_ns), next_ns, "its records are unreadable"))
+        times_at = found + HEAD.size + (6 if opcode == Opcode.MESSAGE else 0)
+        next_ns = self._last_ns
+        if opcode in (Opcode.CHUNK, Opcode.MESSAGE):
+            next_ns = int.from_bytes(self._view[times_at : times_at + 8], "little")
+        first_ns = min(self._last_ns or next_ns, next_ns)
+        self.index.gaps.append(Gap(first_ns, next_ns, "records between these times are unreadable"))
 
     def _next_record(self, start: int) -> int | None:
-        """Where from ``start`` on the next whole chunk, or message of a file without chunks, stands."""
-        chunks = (m.start() for m in _CHUNK.finditer(self._view, start) if self._is_chunk(m.start()))
-        messages = (m.start() for m in _MESSAGE.finditer(self._view, start) if self._is_message(m.start()))
-        found = [next(chunks, None), next(messages, None) if self._loose.segments() else None]
-        return min((at for at in found if at is not None), default=None)
+        """Where from ``start`` on records go on: the first of some that follow each other."""
+        for match in _RECORD.finditer(self._view, start):
+            if self._is_chain(match.start()):
+                return match.start()
+        return None
 
-    def _is_chunk(self, at: int) -> bool:
-        _, length = HEAD.unpack_from(self._view, at)
-        return self._is_record(Opcode.CHUNK, at + HEAD.size, length)
-
-    def _is_message(self, at: int) -> bool:
-        """Whether a message of a known channel stands here, and a record after it."""
-        _, length = HEAD.unpack_from(self._view, at)
-        end = at + HEAD.size + length
-        channel_id = int.from_bytes(self._view[at + HEAD.size : at + HEAD.size + 2], "little")
-        known = length >= _MESSAGE_FIXED and channel_id in self.index.channels
-        return known and end + HEAD.size <= len(self._view) and self._view[end] in _KNOWN
+    def _is_chain(self, at: int) -> bool:
+        """Whether some records in a row stand here, or a chunk or the footer among the first of them."""
+        for _ in range(_CHAIN):
+            if at + HEAD.size > len(self._view):
+                return False
+            opcode, length = HEAD.unpack_from(self._view, at)
+            if opcode not in _KNOWN or not self._is_record(opcode, at + HEAD.size, length):
+                return False
+            if opcode in (Opcode.CHUNK, Opcode.FOOTER):
+                return True
+            at += HEAD.size + length
+        return True
 
 
 def _chunk_fits(view: memoryview, body: int, length: int) -> bool:

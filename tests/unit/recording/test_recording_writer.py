@@ -202,3 +202,25 @@ def test_closing_twice_is_closing_once(tmp_path: Path) -> None:
     size = (tmp_path / "r.mcap").stat().st_size
     writer.close()
     assert (tmp_path / "r.mcap").stat().st_size == size
+
+
+@pytest.mark.usefixtures("full_disk")
+@pytest.mark.parametrize("scans", range(106, 116))
+def test_where_the_end_has_no_room_the_last_chunks_make_some(tmp_path: Path, scans: int) -> None:
+    path = tmp_path / "r.mcap"
+    writer = RecordingWriter(path, INFO, CONFIG, chunk_bytes=5_000)
+    refused = ""
+    try:
+        for number in range(scans):
+            writer.write(scan(number))
+        writer.close()
+    except RecordingError as error:
+        refused = str(error)
+        writer.close()
+    read = read_by_mcap(path)
+    with Recording.open(path) as recording:
+        assert not recording.truncated
+        assert len(recording.scans()) == len(read)
+        lost = int(recording.stats.get("lost", 0))
+    assert bool(lost) == bool(refused)
+    assert len(read) + lost == writer.counts.total()

@@ -1,0 +1,95 @@
+"""Files made from other files: every record taken over as it is, into a file that is whole or not there."""
+
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from pathlib import Path
+
+from mcap.reader import make_reader
+from mcap.records import Channel
+
+from sdt_tools.errors import OutputExistsError, RecordingError
+from sdt_tools.recording.container.file import McapFile
+from sdt_tools.recording.container.reader import McapReader, RawEntry
+from sdt_tools.recording.messages.topics import CAMERA_IMAGE
+from sdt_tools.recording.session import SOFTWARE
+
+
+class RecordCopy:
+    """Takes messages of one file after another over into ``file``, their data untouched.
+
+    Channels are announced when their first message comes, or by ``announce``; the same topic, schema, encoding and
+    metadata from several files make one channel.
+    """
+
+    def __init__(self, file: McapFile) -> None:
+        self._file = file
+        self._numbers: dict[tuple[object, ...], int] = {}
+
+    def announce(self, source: McapReader, channel: Channel) -> int:
+        """The number of ``channel`` of ``source`` in the new file."""
+        schema = source.schema(channel)
+        name, encoding, data = ("", "", b"") if schema is None else (schema.name, schema.encoding, schema.data)
+        key = (
+            channel.topic,
+            channel.message_encoding,
+            name,
+            encoding,
+            data,
+            tuple(sorted(channel.metadata.items())),
+        )
+        number = self._numbers.get(key)
+        if number is None:
+            number = self._numbers[key] = self._file.add_channel(
+                channel.topic,
+                name,
+                data,
+                schema_encoding=encoding,
+                encoding=channel.message_encoding,
+                metadata=channel.metadata,
+            )
+        return number
+
+    def take(self, source: McapReader, entry: RawEntry) -> None:
+        """One message of ``source``."""
+        channel = source.channels[entry.channel_id]
+        number = self.announce(source, channel)
+        compress = channel.topic != CAMERA_IMAGE  # JPEG does not compress
+        self._file.add_message(number, entry.log_ns, entry.publish_ns, entry.data, compress)
+
+
+@contextmanager
+def new_file(out: Path) -> Iterator[McapFile]:
+    """A file to be written at ``out``, which appears there only when it is finished and another reader has read it.
+
+    Raises OutputExistsError where ``out`` exists, RecordingError where the disk refuses or what was written does not
+    read back; then nothing is left at ``out``.
+    """
+    if out.exists():
+        raise OutputExistsError(out)
+    part = out.with_name(f".{out.name}.part")
+    part.unlink(missing_ok=True)
+    file = McapFile(part, SOFTWARE)
+    try:
+        yield file
+        file.finish()
+        file.close()
+        check_readable(part, sum(file.counts.values()))
+        if out.exists():
+            raise OutputExistsError(out)
+        part.rename(out)
+    finally:
+        file.close()
+        with suppress(FileNotFoundError):
+            part.unlink()
+
+
+def check_readable(path: Path, messages: int) -> None:
+    """Read ``path`` with the mcap package, checksums too; raises RecordingError unless it finds so many messages."""
+    try:
+        with path.open("rb") as stream:
+            reader = make_reader(stream, validate_crcs=True)
+            found = sum(1 for _ in reader.iter_messages(log_time_order=False))
+    except Exception as error:
+        raise RecordingError(f"{path}: what was written does not read back ({error}); check the disk") from None
+    if found != messages:
+        raise RecordingError(f"{path}: {found} of {messages} messages read back; check the disk")
