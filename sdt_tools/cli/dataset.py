@@ -22,6 +22,10 @@ def dataset() -> None:
 def build(
     recordings: Annotated[list[Path], typer.Argument(metavar="REC...", help="Labelled recordings.")],
     out: Annotated[Path, typer.Option(help="Folder to make, with frames.parquet and manifest.toml.")],
+    validation: Annotated[
+        list[Path] | None,
+        typer.Option(metavar="REC", help="A recording to validate with, in place of a share of REC...; repeatable."),
+    ] = None,
     config: Annotated[Path | None, typer.Option(help="TOML file; the options below go before it.")] = None,
     labels: Annotated[Path, typer.Option(help="Folder of the journals, <recording>.motion.csv.")] = Path("labels"),
     train_frames: Annotated[int | None, typer.Option(help="Training frames in all; without, as many as fit.")] = None,
@@ -67,7 +71,8 @@ def build(
     settings = parse_config(DatasetConfig, file_values, str(config))
     settings = parse_config(DatasetConfig, file_values | given, "the options")
     with progress_bar("reading recordings") as report:
-        summary = build_dataset(recordings, labels, settings, out, conflict_check(settings.conflict_level), report)
+        check = conflict_check(settings.conflict_level)
+        summary = build_dataset(recordings, labels, settings, out, check, report, validation or ())
     if json_output:
         emit(_document(summary))
     else:

@@ -61,10 +61,12 @@ def build_dataset(
     out: Path,
     conflict_check: ConflictCheck | None = None,
     progress: Progress | None = None,
+    validation: Sequence[Path] = (),
 ) -> DatasetSummary:
     """Build the folder ``out`` with frames.parquet and manifest.toml; the same inputs give the same content.
 
-    ``progress`` counts recordings read, each once for its labels and once for its scans.
+    The recordings ``validation`` alone validate, and all ``recordings`` train; without any, the configuration's share
+    of ``recordings`` validates. ``progress`` counts recordings read, each once for its labels and once for its scans.
 
     Raises OutputExistsError; RecordingError or LabelError for an input that cannot be read; DatasetError where no
     recording is given, one is given twice, a class cannot fill its quota (naming class, have and need), or, unless the
@@ -73,14 +75,16 @@ def build_dataset(
     if out.exists():
         raise OutputExistsError(out)
     report = progress or _no_progress
-    total = 2 * len(recordings)
+    paths = [*recordings, *validation]
+    total = 2 * len(paths)
     labelled: list[LabelledRecording] = []
-    for path in recordings:
+    for path in paths:
         report(len(labelled), total)
         labelled.append(read_labelled(path, labels_dir, config))
+    named = frozenset(recording.recording_id for recording in labelled[len(recordings) :])
     labelled.sort(key=lambda recording: recording.recording_id)
     _refuse_repeated(labelled)
-    selections = select_frames(labelled, config)
+    selections = select_frames(labelled, config, named)
     classes = LabelKind(config.kind).classes
     with _folder_when_whole(out) as scratch:
         conflicts: list[Conflict] = []

@@ -1,7 +1,8 @@
 """Which of the labelled frames are taken: spaced, capped, and in equal numbers a class.
 
 Classes are served rarest first. For each, every recording offers as many of its frames as fit between those already
-taken; the offers are then taken in turns, one a recording, so that no recording gives more than it must.
+taken, and the class's quota is drawn from all that is offered. A recording thus gives in proportion to how long the
+class lasts in it: an equal share from each would favour moments in which a class only just came up.
 """
 
 from collections.abc import Mapping, Sequence
@@ -57,7 +58,7 @@ def fill_quotas(pools: Sequence[Pool], quotas: Mapping[int, int], rules: Rules, 
     filled = dict.fromkeys(quotas, 0)
     for wanted in sorted(quotas, key=lambda label: (supply[label], label)):
         offers = [_offer(pool, wanted, mine, rules, rng) for pool, mine in zip(pools, taken, strict=True)]
-        for place, frames in _take_in_turns(offers, quotas[wanted], rng):
+        for place, frames in _draw(offers, quotas[wanted], rng):
             taken[place] = np.sort(np.append(taken[place], frames))
             filled[wanted] += len(frames)
     return Choice(tuple(taken), filled)
@@ -136,16 +137,13 @@ def _shift_into_slack(
     return shifted
 
 
-def _take_in_turns(
+def _draw(
     offers: Sequence[Int64[np.ndarray, "_"]], quota: int, rng: np.random.Generator
 ) -> list[tuple[int, Int64[np.ndarray, "_"]]]:
-    """Share ``quota`` between the offers, one frame a turn: (place of the offer, the frames taken of it)."""
-    counts = np.array([len(offer) for offer in offers], dtype=np.int64)
-    turns = np.concatenate([np.arange(count) for count in counts]) if len(counts) else counts
-    places = np.repeat(np.arange(len(offers)), counts)
-    rank = rng.permutation(len(offers))[places] if len(offers) else places
-    served = np.bincount(places[np.lexsort((rank, turns))[:quota]], minlength=len(offers))
-    return [(place, offers[place][:count]) for place, count in enumerate(served.tolist()) if count]
+    """``quota`` of all offered frames, each as likely as any other: (place of the offer, the frames taken of it)."""
+    places = np.repeat(np.arange(len(offers)), [len(offer) for offer in offers])
+    taken = np.bincount(rng.permutation(places)[:quota], minlength=len(offers))
+    return [(place, offers[place][:count]) for place, count in enumerate(taken.tolist()) if count]
 
 
 def _room(rules: Rules, taken: int) -> int:

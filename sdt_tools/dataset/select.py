@@ -28,14 +28,18 @@ class Selection:
     frames: Int64[np.ndarray, "frames"]
 
 
-def select_frames(labelled: Sequence[LabelledRecording], config: DatasetConfig) -> list[Selection]:
+def select_frames(
+    labelled: Sequence[LabelledRecording], config: DatasetConfig, named: frozenset[str] = frozenset()
+) -> list[Selection]:
     """One selection for each recording: training first, then validation, each in order of the recordings' ids.
+
+    The recordings ``named`` by their ids validate; where none is, the configuration's share of all.
 
     Raises DatasetError where there are too few recordings, or a class cannot fill its quota (naming class, have, need).
     """
     in_order = sorted(labelled, key=lambda recording: recording.recording_id)
     entries = [SplitEntry(recording.recording_id, recording.scenario) for recording in in_order]
-    validation = validation_ids(entries, config.val_share, config.seed)
+    validation = named or validation_ids(entries, config.val_share, config.seed)
     selections = []
     for number, (split, total) in enumerate([(TRAIN, config.train_frames), (VAL, config.val_frames)]):
         members = [recording for recording in in_order if (recording.recording_id in validation) == (split == VAL)]

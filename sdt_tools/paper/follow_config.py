@@ -14,14 +14,15 @@ from sdt_tools.scene.config import SceneConfig
 
 
 class PracticeConfig(Config):
-    """Recordings of the expert in practice worlds: how many of each family, from seed 0 on, and how long.
+    """Recordings of the expert in practice worlds: how many of each family, from ``first_seed`` on, and how long.
 
     ``courses`` counts those that are looked at; one that the expert does not finish is left out, since being stuck is
     nothing to learn. Scans are taken as often as decisions are made.
     """
 
-    worlds: int = Field(default=800, ge=1, le=1000)
-    too_close: int = Field(default=130, ge=1, le=1000)
+    first_seed: int = Field(default=0, ge=0)
+    worlds: int = Field(default=860, ge=1, le=1000)
+    too_close: int = Field(default=140, ge=1, le=1000)
     world_seconds: float = Field(default=12.0, gt=1.0)
     courses: int = Field(default=900, ge=0, le=1000)
     course_seconds: float = Field(default=40.0, gt=1.0)
@@ -45,18 +46,21 @@ class AggregationConfig(Config):
 
 
 class FollowStudyConfig(Config):
-    """The study's sizes. Practice and training seeds lie below 1,000, reported ones from ``first_reported_seed`` on.
+    """The study's sizes. Practice and training seeds lie below 1,000, reported ones from there on.
 
-    Those right after 1,000 were looked at while the settings were chosen; 2,000 is the first that was not.
+    Validation frames come from practice worlds of ``unseen``. Closed-loop runs begin at ``first_reported_seed``: those
+    right after 1,000 were looked at while the settings were chosen; 2,000 is the first that was not.
 
-    ``paper_data`` is of the paper's size, drawn anew for each training seed from the expert's recordings in practice
-    worlds; ``large_data`` is drawn once from everything, and read by networks of ``large_architecture``, the same nine
-    layers but wider: the narrow one does not take in so much. ``swept_weights`` are values of λ beside the recipe's,
-    tried with ``sweep_seeds`` networks each. ``searched_hard`` is the search for violations in one certified network.
+    ``paper_data`` is of the paper's size, drawn for each training seed from its own part of the expert's recordings in
+    practice worlds; ``large_data`` is drawn once from everything, and read by networks of ``large_architecture``, the
+    same nine layers but wider: the narrow one does not take in so much. ``swept_weights`` are values of λ beside the
+    recipe's, tried with ``sweep_seeds`` networks each. ``searched_hard`` is the search for violations in one certified
+    network.
     """
 
     training_seeds: int = Field(default=5, ge=1)
     practice: PracticeConfig = PracticeConfig()
+    unseen: PracticeConfig = PracticeConfig(first_seed=1000, worlds=215, too_close=35, courses=225)
     aggregation: AggregationConfig = AggregationConfig()
     paper_data: DatasetConfig = DatasetConfig(train_frames=TRAINING_FRAMES, val_frames=VALIDATION_FRAMES)
     large_data: DatasetConfig = DatasetConfig(train_frames=40_000, val_frames=8_000, per_recording_cap=70)

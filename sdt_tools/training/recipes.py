@@ -21,7 +21,9 @@ from sdt_tools.training.schedule import LearningRateConfig
 from sdt_tools.training.specification import SpecificationConfig
 
 ARCHITECTURES: Final = ("plain", "gate")
-_UNHELD: Final = FollowTrainingConfig(architecture=FollowNetConfig(dropout=0.2))
+_UNHELD: Final = FollowTrainingConfig(
+    architecture=FollowNetConfig(dropout=0.3), loop=LoopConfig(learning_rate=LearningRateConfig(peak=3e-3))
+)
 
 
 def recipe_for(specification: SpecificationConfig, arch: str, where: str = "arch") -> FollowTrainingConfig:

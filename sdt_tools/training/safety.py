@@ -40,8 +40,9 @@ class SafetyConfig(Config):
     them. ``clean_weight`` weighs the loss on the data; 0 leaves the domains alone, as in the paper's Proposition 1.
 
     Shares are of the planned steps: none before ``start_share``, all of the weight and range after ``ramp_share``
-    more. ``compress`` takes log(1 + loss) of each domain's loss. ``domains_a_step`` are drawn by chance, or all taken
-    where there are no more.
+    more. Beyond the planned steps, which are gone when the bound is still above δ, the weight grows: by ``late_growth``
+    in as many steps again as were planned. ``compress`` takes log(1 + loss) of each domain's loss. ``domains_a_step``
+    are drawn by chance, or all taken where there are no more.
     """
 
     inner: Literal["ibp", "pgd"] = "ibp"
@@ -51,6 +52,7 @@ class SafetyConfig(Config):
     domains_a_step: int = Field(default=32, ge=1)
     start_share: float = Field(default=0.1, ge=0.0, lt=1.0)
     ramp_share: float = Field(default=0.5, ge=0.0, le=1.0)
+    late_growth: float = Field(default=100.0, ge=1.0)
     compress: bool = True
     pgd: PGDConfig = PGDConfig()
 
@@ -105,7 +107,7 @@ class SafetyDomains:
         losses = self._losses(lower_m, upper_m, self._part[chosen])
         if config.compress:
             losses = torch.log1p(losses)
-        return config.weight * strength * losses.mean()
+        return weight(config, progress) * losses.mean()
 
     def measure(self) -> SafetyRecord:
         """All whole domains."""
@@ -159,12 +161,17 @@ class SafetyDomains:
 
 
 def ramp(config: SafetyConfig, progress: float) -> float:
-    """Share of weight and range at the share ``progress`` of the planned steps: 0, a line, 1."""
+    """Share of λ and of the range at the share ``progress`` of the planned steps: 0, a line, 1."""
     if progress < config.start_share:
         return 0.0
     if config.ramp_share == 0.0:
         return 1.0
     return min(1.0, (progress - config.start_share) / config.ramp_share)
+
+
+def weight(config: SafetyConfig, progress: float) -> float:
+    """λ at the share ``progress`` of the planned steps: it grows along the ramp, and again when they are gone."""
+    return config.weight * ramp(config, progress) * config.late_growth ** max(0.0, progress - 1.0)
 
 
 def narrowed(

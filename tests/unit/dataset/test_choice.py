@@ -9,9 +9,13 @@ def pool(frames: int, label: int = 0, period: int = 100) -> Pool:
     return Pool(np.arange(frames, dtype=np.int64) * period, np.full(frames, label, dtype=np.int64))
 
 
-def test_recordings_give_in_turns_until_the_short_ones_are_empty() -> None:
-    choice = fill_quotas([pool(2), pool(50), pool(50), pool(50)], {0: 23}, Rules(0, None), [0])
-    assert sorted(len(frames) for frames in choice.taken) == [2, 7, 7, 7]
+def test_recordings_give_in_proportion_to_what_they_offer() -> None:
+    taken = [
+        [len(frames) for frames in fill_quotas([pool(20), pool(60)], {0: 40}, Rules(0, None), [seed]).taken]
+        for seed in range(50)
+    ]
+    assert all(sum(counts) == 40 for counts in taken)
+    assert 9 < np.mean([few for few, _ in taken]) < 11
 
 
 def test_every_frame_of_a_run_has_its_chance_not_only_the_first() -> None:

@@ -97,6 +97,14 @@ def test_no_recording_is_in_both_splits(recordings: list[Path], tmp_path: Path) 
     assert summary.recordings == 10
 
 
+def test_recordings_named_for_validation_validate_alone(recordings: list[Path], tmp_path: Path) -> None:
+    folder = recordings[0].parent
+    built = build_dataset(recordings[:7], folder / "labels", DatasetConfig(), tmp_path / "d", validation=recordings[7:])
+    dataset = load_dataset(built.folder)
+    assert {path.stem for path in recordings[7:]} == set(dataset.val.recordings)
+    assert {path.stem for path in recordings[:7]} == set(dataset.train.recordings)
+
+
 def test_totals_are_met_exactly_and_balanced(recordings: list[Path], tmp_path: Path) -> None:
     summary = build_in(tmp_path, recordings, train_frames=45, val_frames=14)
     assert (summary.train_frames, summary.val_frames) == (45, 14)

@@ -14,7 +14,7 @@ from sdt_tools.models.preprocess import PreprocessConfig
 from sdt_tools.robustness.domains import NOT_FORWARD, SafetyLevel, domains
 from sdt_tools.training.inner import PGDConfig, bound_losses, found_losses, set_losses
 from sdt_tools.training.loop import Batch, LoopConfig, run_loop
-from sdt_tools.training.safety import SafetyConfig, SafetyDomains, adversarial_domains, narrowed, ramp
+from sdt_tools.training.safety import SafetyConfig, SafetyDomains, adversarial_domains, narrowed, ramp, weight
 from sdt_tools.training.schedule import LearningRateConfig
 
 SMALL = FollowNetConfig(kernels=(9, 5), widths=(4, 6), strides=(6, 4), hidden=8, dropout=0.0)
@@ -173,3 +173,8 @@ def adversarially_train(network: FollowNet, data: Batch, epochs: int) -> None:
         optimizer.zero_grad()
         torch.autograd.backward(loss)
         optimizer.step()
+
+
+def test_lambda_grows_when_the_planned_steps_are_gone() -> None:
+    config = SafetyConfig(weight=2.0, start_share=0.1, ramp_share=0.5, late_growth=100.0)
+    assert [weight(config, progress) for progress in (0.05, 0.35, 0.6, 1.0, 1.5)] == pytest.approx([0, 1, 2, 2, 20])
