@@ -7,6 +7,7 @@ from sdt_tools.config import Config, RateConfig
 from sdt_tools.dataset.config import DatasetConfig
 from sdt_tools.evaluation.closed_loop import ClosedLoopConfig
 from sdt_tools.models.follow_net import FollowNetConfig
+from sdt_tools.models.preprocess import PreprocessConfig
 from sdt_tools.paper.printed import TRAINING_FRAMES, VALIDATION_FRAMES
 from sdt_tools.recording.live.perturb import PerturbConfig
 from sdt_tools.robustness.attacks import AttackConfig
@@ -53,7 +54,8 @@ class FollowStudyConfig(Config):
 
     ``paper_data`` is of the paper's size, drawn for each training seed from its own part of the expert's recordings in
     practice worlds; ``large_data`` is drawn once from everything, and read by networks of ``large_architecture``, the
-    same nine layers but wider: the narrow one does not take in so much. ``swept_weights`` are values of λ beside the
+    same nine layers but wider and with ``large_preprocess``: the narrow one does not take in so much, and so much data
+    also says what is far. ``swept_weights`` are values of λ beside the
     recipe's, tried with ``sweep_seeds`` networks each. ``searched_hard`` is the search for violations in one certified
     network.
     """
@@ -66,6 +68,7 @@ class FollowStudyConfig(Config):
     large_data: DatasetConfig = DatasetConfig(train_frames=40_000, val_frames=8_000, per_recording_cap=70)
     large_epochs: int = Field(default=30, ge=1)
     large_architecture: FollowNetConfig = FollowNetConfig(widths=(16, 32, 48, 64, 64, 64, 64), hidden=96, dropout=0.2)
+    large_preprocess: PreprocessConfig = PreprocessConfig(clip_m=4.0)
     paper_epochs: int = Field(default=80, ge=1)
     first_reported_seed: int = Field(default=2000, ge=1000)
     runs: int = Field(default=20, ge=1)

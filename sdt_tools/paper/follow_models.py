@@ -97,7 +97,7 @@ def settings(family: Family, seed: int, config: FollowStudyConfig) -> FollowTrai
     epochs = config.large_epochs if large else config.paper_epochs
     changed: dict[str, object] = {"seed": seed, "loop": recipe.loop.model_copy(update={"epochs": epochs})}
     if large:
-        changed["architecture"] = config.large_architecture
+        changed |= {"architecture": config.large_architecture, "preprocess": config.large_preprocess}
     if family.weight is not None:
         changed["safety"] = recipe.safety.model_copy(update={"weight": family.weight})
     return recipe.model_copy(update=changed)
