@@ -70,11 +70,11 @@ def run_follow_study(out: Path, config: FollowStudyConfig, workers: int, progres
 def _certify(
     out: Path, trained: Sequence[Trained], config: FollowStudyConfig, workers: int, progress: StageProgress
 ) -> list[Path]:
-    """First what is searched with many restarts: one network of level 4 on the larger data. Then each network.
+    """First what is searched with many restarts: one network of level 4. Then each network.
 
     Networks are judged at their own level; those of level 0 at level 3, where violations are to be found.
     """
-    hard = next(one for one in trained if one.family == Family("large", "gate", 4))
+    hard = next(one for one in trained if one.family == Family("paper", "gate", 4))
     units = [
         Unit(
             f"searched/{hard.checkpoint.name}",

@@ -10,6 +10,7 @@ business of an inner maximiser (``training.inner``). Three things keep the train
 thousands of nats, enters through log(1 + loss).
 """
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Final, Literal
@@ -171,7 +172,7 @@ def ramp(config: SafetyConfig, progress: float) -> float:
 
 def weight(config: SafetyConfig, progress: float) -> float:
     """λ at the share ``progress`` of the planned steps: it grows along the ramp, and again when they are gone."""
-    return config.weight * ramp(config, progress) * config.late_growth ** max(0.0, progress - 1.0)
+    return config.weight * ramp(config, progress) * math.pow(config.late_growth, max(0.0, progress - 1.0))
 
 
 def narrowed(
