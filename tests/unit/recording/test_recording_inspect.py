@@ -89,8 +89,8 @@ def test_what_is_no_recording_is_refused(tmp_path: Path) -> None:
 
 
 def scene(path: Path) -> Path:
-    """Two seconds of the scene, with its camera."""
-    config = SceneRecordingConfig(scenario="plain", seed=5, seconds=2.0)
+    """A second of the scene, with its camera."""
+    config = SceneRecordingConfig(scenario="plain", seed=5, seconds=1.0)
     record_scene(config, path, lambda _, source: ExpertDriver(source.expert))
     return path
 
@@ -116,7 +116,7 @@ def test_counting_a_scene_again_agrees_with_its_stats(tmp_path: Path) -> None:
     assert noted.health == "good"
     pairs = noted.document()["pairs"]
     assert isinstance(pairs, dict)
-    assert (pairs["count"], pairs["unpaired"], round(pairs["skew_ms_p50"], 2)) == (60, 0, 6.67)
+    assert (pairs["count"], pairs["unpaired"], round(pairs["skew_ms_p50"], 2)) == (30, 0, 6.67)
 
 
 @pytest.mark.parametrize("chunk_bytes", [20_000, 1 << 20])
