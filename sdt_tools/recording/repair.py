@@ -11,6 +11,7 @@ from sdt_tools.recording.container.reader import Damage, McapReader
 from sdt_tools.recording.copying import RecordCopy, new_file
 from sdt_tools.recording.messages.topics import is_ours
 from sdt_tools.recording.session import STATS
+from sdt_tools.recording.timing.pauses import pauses_of
 from sdt_tools.recording.timing.stamps import StampLog
 from sdt_tools.recording.timing.summary import ENTRY, timing_entries, timing_of
 
@@ -80,7 +81,7 @@ def repair_recording(path: Path, out: Path) -> RepairReport:
         if stats:
             counts = {f"count.{topic}": str(count) for topic, count in messages.items()}
             kept = {name: text for name, text in stats[-1].items() if not name.startswith(ENTRY)}
-            file.add_metadata(STATS, kept | counts | timing_entries(timing_of(stamps)))
+            file.add_metadata(STATS, kept | counts | timing_entries(timing_of(stamps, pauses_of(kept))))
         file.add_metadata(
             REPAIRED,
             {

@@ -31,8 +31,9 @@ from sdt_tools.recording.session import (
     derived_id,
     session_metadata,
 )
+from sdt_tools.recording.timing.pauses import pauses_of
 from sdt_tools.recording.timing.stamps import StampLog, read_stamps
-from sdt_tools.recording.timing.summary import Timing, timing_entries, timing_of
+from sdt_tools.recording.timing.summary import timing_entries, timing_of
 
 FLUSH_NS: Final = SECOND_NS // 2
 SYNC_NS: Final = SECOND_NS
@@ -177,14 +178,14 @@ class RecordingWriter:
     def _final_stats(self) -> dict[str, str]:
         kept = self._file.counts
         lost = self.counts.total() - sum(kept.values())
-        timing = self._timing_in_file() if lost else timing_of(self._stamps)
+        timing = timing_of(self._stamps_in_file() if lost else self._stamps, pauses_of(self._stats))
         stats = {f"count.{topic}": str(count) for topic, count in kept.items()} | timing_entries(timing) | self._stats
         return stats | {"lost": str(lost)} if lost else stats
 
-    def _timing_in_file(self) -> Timing:
+    def _stamps_in_file(self) -> StampLog:
         """For a file that holds less than was written, which only the file can tell."""
         with McapReader(self.path) as file:
-            return timing_of(read_stamps(file, {number: topic for topic, number in self._channels.items()}))
+            return read_stamps(file, {number: topic for topic, number in self._channels.items()})
 
     def _check_sync(self) -> None:
         error = self._sync.exception() if self._sync is not None else None

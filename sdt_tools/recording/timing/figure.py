@@ -1,6 +1,7 @@
 """The timing of a recording as a picture: intervals of each sensor, delay and drift, skew of scans and images."""
 
 from collections.abc import Mapping
+from contextlib import suppress
 from pathlib import Path
 from typing import Final
 
@@ -13,6 +14,7 @@ from sdt_tools.clock import SECOND_NS
 from sdt_tools.errors import OutputExistsError, RunError
 from sdt_tools.recording.messages.topics import CAMERA_IMAGE, LIDAR_SCAN, SENSORS
 from sdt_tools.recording.timing.pairs import TOLERANCE_NS, pair_skews
+from sdt_tools.recording.timing.pauses import Pauses, spans_pause
 from sdt_tools.recording.timing.stamps import StampLog, TopicStamps
 from sdt_tools.recording.timing.topic import LATE, TopicTiming, topic_timing
 
@@ -25,8 +27,8 @@ _MOST_POINTS: Final = 20_000
 """More would only make the picture slow: of longer series, the largest value of each stretch is drawn."""
 
 
-def timing_figure(log: StampLog, out: Path, title: str) -> None:
-    """Draw what ``log`` saw of the sensors to the PNG ``out``.
+def timing_figure(log: StampLog, pauses: Pauses, out: Path, title: str) -> None:
+    """Draw what ``log`` saw of the sensors to the PNG ``out``; ``pauses`` are grey.
 
     Raises OutputExistsError where ``out`` exists, RunError where it cannot be written.
     """
@@ -41,7 +43,7 @@ def timing_figure(log: StampLog, out: Path, title: str) -> None:
     panels = {name: figure.add_subplot(grid[row, :]) for row, name in enumerate(sensors)}
     panels |= {name: figure.add_subplot(grid[-1, column]) for column, name in enumerate(("delay", "skew"))}
     for name, stamps in sensors.items():
-        _draw_intervals(panels[name], name, stamps, begin_ns)
+        _draw_intervals(panels[name], name, stamps, begin_ns, pauses)
     _draw_delays(panels["delay"], sensors, begin_ns)
     _draw_skew(panels["skew"], sensors)
     for panel in panels.values():
@@ -52,18 +54,21 @@ def timing_figure(log: StampLog, out: Path, title: str) -> None:
     _save(figure, out)
 
 
-def _draw_intervals(panel: Axes, name: str, stamps: TopicStamps, begin_ns: int) -> None:
+def _draw_intervals(panel: Axes, name: str, stamps: TopicStamps, begin_ns: int, pauses: Pauses) -> None:
     """The interval before each message, and where it is a gap."""
-    timing = topic_timing(stamps, periodic=True)
-    stamps_ns = np.sort(stamps.stamps_ns)
-    intervals_ns = np.diff(stamps_ns)
+    timing = topic_timing(stamps, periodic=True, pauses=pauses)
+    in_order = np.argsort(stamps.stamps_ns, kind="stable")
+    counts = ~spans_pause(stamps.received_ns[in_order], pauses)
+    intervals_ns = np.diff(stamps.stamps_ns[in_order])[counts]
+    ends_s = (stamps.stamps_ns[in_order][1:][counts] - begin_ns) / SECOND_NS
     shown = _peaks(intervals_ns)
-    at_s = (stamps_ns[1:][shown] - begin_ns) / SECOND_NS
-    panel.plot(at_s, intervals_ns[shown] / _MS_NS, ".", markersize=3, color=_colour(name))
+    panel.plot(ends_s[shown], intervals_ns[shown] / _MS_NS, ".", markersize=3, color=_colour(name))
+    for start_ns, end_ns in pauses:
+        panel.axvspan((start_ns - begin_ns) / SECOND_NS, (end_ns - begin_ns) / SECOND_NS, color="#dee2e6")
     if timing.period_ns is not None:
         gap = intervals_ns > LATE * timing.period_ns
         panel.plot(
-            (stamps_ns[1:][gap] - begin_ns) / SECOND_NS,
+            ends_s[gap],
             intervals_ns[gap] / _MS_NS,
             "o",
             markersize=5,
@@ -158,9 +163,11 @@ def _colour(name: str) -> str:
 def _save(figure: Figure, out: Path) -> None:
     part = out.with_name(f".{out.name}.part")
     try:
+        out.parent.mkdir(parents=True, exist_ok=True)
         figure.savefig(part, dpi=110, format="png")
         part.rename(out)
     except OSError as error:
         raise RunError(f"{out}: the picture cannot be written: {error.strerror}; choose another --plot") from None
     finally:
-        part.unlink(missing_ok=True)
+        with suppress(OSError):
+            part.unlink()

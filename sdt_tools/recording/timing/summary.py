@@ -10,6 +10,7 @@ from pydantic import TypeAdapter, ValidationError
 
 from sdt_tools.recording.messages.topics import CAMERA_IMAGE, LIDAR_SCAN, TOPIC_BY_NAME
 from sdt_tools.recording.timing.pairs import PairTiming, pair_timing
+from sdt_tools.recording.timing.pauses import Pauses
 from sdt_tools.recording.timing.stamps import StampLog
 from sdt_tools.recording.timing.topic import TopicTiming, topic_timing
 
@@ -26,12 +27,12 @@ class Timing:
     pairs: PairTiming
 
 
-def timing_of(log: StampLog) -> Timing:
-    """The numbers of what ``log`` saw: the same for the same messages, in whatever order they came."""
+def timing_of(log: StampLog, pauses: Pauses = ()) -> Timing:
+    """The numbers of what ``log`` saw between ``pauses``: the same for the same messages, in whatever order."""
     stamps = dict(log.topics())
     none = np.empty(0, np.int64)
     scans, images = (stamps[name].stamps_ns if name in stamps else none for name in (LIDAR_SCAN, CAMERA_IMAGE))
-    topics = {name: topic_timing(times, _is_periodic(name)) for name, times in stamps.items()}
+    topics = {name: topic_timing(times, _is_periodic(name), pauses) for name, times in stamps.items()}
     return Timing(topics, pair_timing(scans, images))
 
 
@@ -39,6 +40,11 @@ def timing_entries(timing: Timing) -> dict[str, str]:
     """``timing`` as entries for ``sdt.stats``; nothing is rounded."""
     topics = {f"{ENTRY}{name}": _json(asdict(topic)) for name, topic in timing.topics.items()}
     return topics | {_PAIRS: _json(asdict(timing.pairs))}
+
+
+def has_timing(stats: Mapping[str, str]) -> bool:
+    """Whether ``sdt.stats`` says anything of timing."""
+    return _PAIRS in stats
 
 
 def noted_timing(stats: Mapping[str, str], counts: Mapping[str, int]) -> Timing | None:

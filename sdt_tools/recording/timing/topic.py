@@ -7,6 +7,7 @@ import numpy as np
 from jaxtyping import Int64
 
 from sdt_tools.recording.timing.drift import Drift, drift_of
+from sdt_tools.recording.timing.pauses import Pauses, spans_pause
 from sdt_tools.recording.timing.stamps import TopicStamps
 
 LATE: Final = 1.5
@@ -54,12 +55,12 @@ class TopicTiming:
     drift: Drift | None
 
 
-def topic_timing(stamps: TopicStamps, periodic: bool) -> TopicTiming:
-    """The timing of ``stamps``, of which there is at least one."""
+def topic_timing(stamps: TopicStamps, periodic: bool, pauses: Pauses = ()) -> TopicTiming:
+    """The timing of ``stamps``, of which there is at least one; intervals with a pause in them do not count."""
     in_order = np.argsort(stamps.stamps_ns, kind="stable")
     stamps_ns = stamps.stamps_ns[in_order]
     delays_ns = (stamps.received_ns - stamps.stamps_ns)[in_order]
-    intervals_ns = np.diff(stamps_ns)
+    intervals_ns = np.diff(stamps_ns)[~spans_pause(stamps.received_ns[in_order], pauses)]
     period_ns = period_of(intervals_ns) if periodic else None
     gap = intervals_ns > LATE * period_ns if period_ns is not None else np.zeros(len(intervals_ns), bool)
     missing = np.round(intervals_ns[gap] / period_ns) - 1 if period_ns is not None else np.zeros(0)

@@ -3,6 +3,7 @@ from pathlib import Path
 import cv2
 import numpy as np
 import pytest
+from mcap.writer import CompressionType, Writer
 from recording_samples import CONFIG, INFO, T0, image, one_of_each, scan, write
 from timing_samples import MS_NS, Stream, together
 
@@ -11,6 +12,7 @@ from sdt_tools.frames import Odometry, Pose2D, Received
 from sdt_tools.recording.inspect import InspectReport, draw_timing, inspect_recording
 from sdt_tools.recording.live.drivers import ExpertDriver
 from sdt_tools.recording.live.scene_session import SceneRecordingConfig, record_scene
+from sdt_tools.recording.messages.schemas import schema_data
 from sdt_tools.recording.repair import repair_recording
 from sdt_tools.recording.writer import RecordingWriter
 
@@ -197,6 +199,37 @@ def test_what_the_recorder_dropped_is_told_beside_what_is_missing(tmp_path: Path
     assert (topic["drops"], topic["dropped"], topic["missing"]) == (5, 5, 3)  # two after the last one that was kept
 
 
+def test_a_pause_is_no_gap(tmp_path: Path) -> None:
+    pause = range(T0 + 500 * MS_NS, T0 + 1500 * MS_NS)
+    messages = [m for m in Stream(20e6, 5 * MS_NS, missing={20}).scans(3) if m.received_ns not in pause]
+    with RecordingWriter(tmp_path / "r.mcap", INFO, CONFIG) as writer:
+        for received in messages:
+            writer.write(received)
+        writer.note({"pauses_ns": f"{pause.start}-{pause.stop}"})
+    noted, counted = (inspect_recording(tmp_path / "r.mcap", full) for full in (False, True))
+    topic = noted.topic_document("/lidar/scan")
+    assert (topic["gaps"], topic["missing"], topic["max_gap_ms"]) == (1, 1, 40.0)
+    assert counted.disagreements == ()
+    assert counted.timing == noted.timing
+    draw_timing(noted, tmp_path / "timing.png")
+
+
+@pytest.mark.parametrize("chunked", [True, False])
+def test_a_recording_by_others_is_counted(tmp_path: Path, chunked: bool) -> None:
+    with (tmp_path / "r.mcap").open("wb") as file:
+        others = Writer(file, compression=CompressionType.ZSTD, use_chunking=chunked)
+        others.start()
+        schema = others.register_schema("foxglove.LaserScan", "protobuf", schema_data("foxglove.LaserScan"))
+        channel = others.register_channel("/lidar/scan", "protobuf", schema)
+        for received_ns, stamp_ns in Stream(20e6, 5 * MS_NS, missing={20, 30, 31}).times(2):
+            others.add_message(channel, received_ns, b"not even a scan", stamp_ns)
+        others.finish()
+    report = inspect_recording(tmp_path / "r.mcap")
+    topic = report.topic_document("/lidar/scan")
+    assert report.counted
+    assert (topic["count"], topic["gaps"], topic["missing"], topic["delay_ms_p50"]) == (97, 2, 3, 5.0)
+
+
 def test_the_same_messages_give_the_same_bytes(tmp_path: Path) -> None:
     one, two = (write(tmp_path / name, ROUGH).read_bytes() for name in ("one", "two"))
     assert one == two
@@ -211,8 +244,9 @@ def test_timing_is_drawn_and_never_over_another_picture(tmp_path: Path) -> None:
     assert sorted(file.name for file in tmp_path.iterdir()) == ["r.mcap", "timing.png"]
     with pytest.raises(OutputExistsError, match="exists already"):
         draw_timing(report, tmp_path / "timing.png")
-    with pytest.raises(RunError, match="cannot be written: No such file"):
-        draw_timing(report, tmp_path / "missing" / "timing.png")
+    draw_timing(report, tmp_path / "new" / "timing.png")
+    with pytest.raises(RunError, match=r"cannot be written: (Not a directory|File exists)"):
+        draw_timing(report, tmp_path / "r.mcap" / "timing.png")
 
 
 @pytest.mark.parametrize("messages", [[], one_of_each(), [image(n) for n in range(9)]])

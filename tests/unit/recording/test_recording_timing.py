@@ -1,6 +1,8 @@
+from random import Random
+
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from recording_samples import T0
 from scipy.stats import theilslopes
@@ -122,8 +124,9 @@ TIMES = st.lists(st.tuples(st.integers(0, 2**62), st.integers(0, 2**62)), min_si
 
 
 @given(TIMES, TIMES, st.randoms(use_true_random=False))
+@settings(deadline=None, max_examples=50)
 def test_numbers_do_not_depend_on_the_order_and_survive_the_file(
-    scans: list[tuple[int, int]], images: list[tuple[int, int]], random: "np.random.Generator"
+    scans: list[tuple[int, int]], images: list[tuple[int, int]], random: Random
 ) -> None:
     messages = [(SCAN, *times) for times in scans] + [(IMAGE, *times) for times in images]
     log, shuffled = StampLog(), StampLog()
