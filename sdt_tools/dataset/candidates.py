@@ -9,10 +9,10 @@ from jaxtyping import Int64
 
 from sdt_tools.dataset.choice import Pool
 from sdt_tools.dataset.config import DatasetConfig
-from sdt_tools.dataset.join import nearest_pairs
 from sdt_tools.labeling.journal import read_journal
 from sdt_tools.labeling.resolve import disagreements, resolve
 from sdt_tools.labeling.vocabulary import LabelKind, journal_path
+from sdt_tools.recording.pairing import nearest_pairs
 from sdt_tools.recording.reader import Recording
 from sdt_tools.runs.unit import content_hash
 

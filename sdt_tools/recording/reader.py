@@ -16,6 +16,7 @@ from sdt_tools.recording.messages.topics import LIDAR_SCAN, TOPICS, is_ours
 from sdt_tools.recording.series import ScanSeries, joined
 from sdt_tools.recording.session import CONFIG_NAME, SESSION, STATS, derived_id
 from sdt_tools.recording.summary import TopicSummary
+from sdt_tools.recording.timing.stamps import StampLog, read_stamps
 
 SCAN_BATCH: Final = 4096
 """Scans in a batch unless told otherwise: 18 MB."""
@@ -123,6 +124,20 @@ class Recording:
                 channel.topic, schema, extent.count, extent.first_ns, extent.last_ns
             )
         return dict(sorted(summaries.items()))
+
+    @property
+    def schemas(self) -> Mapping[str, str]:
+        """The schema of each of our topics in the file, whether or not it has messages."""
+        return {channel.topic: self._file.schema_name(channel) for channel in self._ours.values()}
+
+    @property
+    def counted(self) -> bool:
+        """Whether the file itself says what it holds; else only its messages do."""
+        return self._file.counts is not None
+
+    def stamps(self) -> StampLog:
+        """When all messages of our topics were taken and received: streams through the file and decodes nothing."""
+        return read_stamps(self._file, {number: channel.topic for number, channel in self._ours.items()})
 
     @property
     def foreign_topics(self) -> tuple[str, ...]:

@@ -9,7 +9,11 @@ from typing import Final
 from sdt_tools.errors import RecordingError
 from sdt_tools.recording.container.reader import Damage, McapReader
 from sdt_tools.recording.copying import RecordCopy, new_file
+from sdt_tools.recording.messages.topics import is_ours
 from sdt_tools.recording.session import STATS
+from sdt_tools.recording.timing.pauses import pauses_of
+from sdt_tools.recording.timing.stamps import StampLog
+from sdt_tools.recording.timing.summary import ENTRY, timing_entries, timing_of
 
 REPAIRED: Final = "sdt.repair"
 
@@ -50,7 +54,7 @@ def repair_recording(path: Path, out: Path) -> RepairReport:
     """Take all that can be read of ``path``, topics of others too, over into the new file ``out``.
 
     The original is only read. The file says in its metadata ``sdt.repair`` what was wrong with the original; its
-    ``sdt.stats``, where it had some, are taken over with their counts put right.
+    ``sdt.stats``, where it had some, are taken over with their counts and timing put right.
     Raises OutputExistsError where ``out`` exists; RecordingError for a path that is missing or not an MCAP, that holds
     nothing to save, and where the repaired file does not read back: then there is none.
     """
@@ -63,8 +67,11 @@ def repair_recording(path: Path, out: Path) -> RepairReport:
                 file.add_metadata(record.name, record.metadata)
         for channel in source.channels.values():
             copy.announce(source, channel)
+        ours, stamps = _our_topics(source), StampLog()
         for entry in source.entries():
             copy.take(source, entry)
+            if entry.channel_id in ours:
+                stamps.see(ours[entry.channel_id], entry.log_ns, entry.publish_ns)
         file.finish_chunks()
         messages = file.counts
         if not source.channels and not source.metadata:
@@ -73,7 +80,8 @@ def repair_recording(path: Path, out: Path) -> RepairReport:
         stats = [dict(record.metadata) for record in source.metadata if record.name == STATS]
         if stats:
             counts = {f"count.{topic}": str(count) for topic, count in messages.items()}
-            file.add_metadata(STATS, stats[-1] | counts)
+            kept = {name: text for name, text in stats[-1].items() if not name.startswith(ENTRY)}
+            file.add_metadata(STATS, kept | counts | timing_entries(timing_of(stamps, pauses_of(kept))))
         file.add_metadata(
             REPAIRED,
             {
@@ -83,6 +91,14 @@ def repair_recording(path: Path, out: Path) -> RepairReport:
             },
         )
     return report
+
+
+def _our_topics(source: McapReader) -> dict[int, str]:
+    return {
+        number: channel.topic
+        for number, channel in source.channels.items()
+        if is_ours(channel.topic, source.schema_name(channel), channel.message_encoding)
+    }
 
 
 def _lost(source: McapReader, messages: Mapping[str, int]) -> dict[str, int] | None:

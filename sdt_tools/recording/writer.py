@@ -18,6 +18,7 @@ from sdt_tools.errors import DiskRefusedError, RecordingError
 from sdt_tools.frames import CameraImage, Received
 from sdt_tools.protocols import SourceInfo
 from sdt_tools.recording.container.file import CHUNK_BYTES, McapFile
+from sdt_tools.recording.container.reader import McapReader
 from sdt_tools.recording.messages.codec import encode
 from sdt_tools.recording.messages.schemas import schema_data
 from sdt_tools.recording.messages.topics import topic_of
@@ -30,6 +31,9 @@ from sdt_tools.recording.session import (
     derived_id,
     session_metadata,
 )
+from sdt_tools.recording.timing.pauses import pauses_of
+from sdt_tools.recording.timing.stamps import StampLog, read_stamps
+from sdt_tools.recording.timing.summary import timing_entries, timing_of
 
 FLUSH_NS: Final = SECOND_NS // 2
 SYNC_NS: Final = SECOND_NS
@@ -65,6 +69,7 @@ class RecordingWriter:
         self.counts: Counter[str] = Counter()
         """Messages taken so far, by topic."""
         self._stats: dict[str, str] = {}
+        self._stamps = StampLog()
         self._channels: dict[str, int] = {}
         self._realtime = realtime
         self._monotonic_ns = monotonic_ns
@@ -105,6 +110,7 @@ class RecordingWriter:
             )
         compress = not isinstance(message, CameraImage)  # JPEG does not compress
         self.counts[topic.name] += 1
+        self._stamps.see(topic.name, received.received_ns, message.stamp_ns)
         try:
             self._file.add_message(channel_id, received.received_ns, message.stamp_ns, encode(message), compress)
         except DiskRefusedError:
@@ -172,8 +178,14 @@ class RecordingWriter:
     def _final_stats(self) -> dict[str, str]:
         kept = self._file.counts
         lost = self.counts.total() - sum(kept.values())
-        stats = {f"count.{topic}": str(count) for topic, count in kept.items()} | self._stats
+        timing = timing_of(self._stamps_in_file() if lost else self._stamps, pauses_of(self._stats))
+        stats = {f"count.{topic}": str(count) for topic, count in kept.items()} | timing_entries(timing) | self._stats
         return stats | {"lost": str(lost)} if lost else stats
+
+    def _stamps_in_file(self) -> StampLog:
+        """For a file that holds less than was written, which only the file can tell."""
+        with McapReader(self.path) as file:
+            return read_stamps(file, {number: topic for topic, number in self._channels.items()})
 
     def _check_sync(self) -> None:
         error = self._sync.exception() if self._sync is not None else None

@@ -46,13 +46,18 @@ def test_record_then_inspect(
 
     assert sdt(monkeypatch, "inspect", out, "--json") == 0
     report = json.loads(capsys.readouterr().out)
-    assert report["topics"]["/lidar/scan"] == {"schema": "foxglove.LaserScan", "count": 150, "hz": 50.0}
+    scans = report["topics"]["/lidar/scan"]
+    assert scans.items() >= {"schema": "foxglove.LaserScan", "count": 150, "hz": 50.0, "gaps": 0, "drops": 0}.items()
+    assert (scans["max_gap_ms"], report["health"], report["truncated"]) == (20.0, "good", False)
+    assert report["pairs"]["count"] == 0  # without a camera
     assert report["recording_id"] == told["recording_id"]
     assert (report["session"]["scenario"], report["session"]["seed"]) == ("plain", "7")
     assert "seed = 7" in report["config"]
 
-    assert sdt(monkeypatch, "inspect", out) == 0
+    assert sdt(monkeypatch, "inspect", out, "--full", "--plot", tmp_path / "timing.png") == 0
+    assert (tmp_path / "timing.png").exists()
     table = capsys.readouterr().err
+    assert "good (counted from the messages)" in table
     assert "/lidar/scan" in table
     assert "50.00" in table
 

@@ -1,4 +1,4 @@
-"""Pairing and choosing frames, against brute force."""
+"""Choosing frames, against brute force."""
 
 from itertools import combinations
 
@@ -7,10 +7,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from sdt_tools.dataset.choice import Pool, Rules, available, equal_quotas, fill_quotas, largest_equal_quota, pack
-from sdt_tools.dataset.join import nearest_pairs
 
 STAMPS = st.lists(st.integers(0, 60), max_size=14).map(lambda stamps: np.array(sorted(stamps), dtype=np.int64))
-UNIQUE = st.lists(st.integers(0, 60), max_size=14, unique=True).map(lambda s: np.array(sorted(s), dtype=np.int64))
 SPACING = st.integers(0, 12)
 CAP = st.none() | st.integers(1, 6)
 
@@ -22,44 +20,6 @@ def pools(draw: st.DrawFn) -> list[Pool]:
         labels = draw(st.lists(st.integers(0, 2), min_size=len(stamps), max_size=len(stamps)))
         made.append(Pool(stamps, np.array(labels, dtype=np.int64)))
     return made
-
-
-@given(UNIQUE, STAMPS, st.integers(0, 10))
-def test_pairs_are_one_to_one_near_and_leave_no_better_pair(
-    labels: np.ndarray, scans: np.ndarray, tolerance: int
-) -> None:
-    pairs = nearest_pairs(labels, scans, tolerance)
-    assert len(set(pairs[:, 0])) == len(set(pairs[:, 1])) == len(pairs)
-    assert np.all(np.diff(pairs[:, 0]) > 0)
-    distance_of_label = dict.fromkeys(range(len(labels)), 10**6)
-    distance_of_scan = dict.fromkeys(range(len(scans)), 10**6)
-    for label, scan in pairs.tolist():
-        distance_of_label[label] = distance_of_scan[scan] = abs(int(labels[label]) - int(scans[scan]))
-        assert distance_of_label[label] <= tolerance
-    for label in range(len(labels)):
-        for scan in range(len(scans)):
-            apart = abs(int(labels[label]) - int(scans[scan]))
-            if apart <= tolerance:
-                assert distance_of_label[label] <= apart or distance_of_scan[scan] <= apart
-
-
-@given(UNIQUE, UNIQUE, st.integers(0, 10), st.integers(-(10**15), 10**15))
-def test_pairing_depends_on_differences_alone(
-    labels: np.ndarray, scans: np.ndarray, tolerance: int, shift: int
-) -> None:
-    np.testing.assert_array_equal(
-        nearest_pairs(labels, scans, tolerance), nearest_pairs(labels + shift, scans + shift, tolerance)
-    )
-
-
-@given(st.integers(1, 40), st.integers(0, 9), st.data())
-def test_labels_that_jitter_less_than_half_a_period_find_their_own_scans(
-    count: int, jitter: int, data: st.DataObject
-) -> None:
-    scans = np.arange(count, dtype=np.int64) * 20
-    moved = data.draw(st.lists(st.integers(-jitter, jitter), min_size=count, max_size=count))
-    pairs = nearest_pairs(scans + np.array(moved, dtype=np.int64), scans, 9)
-    np.testing.assert_array_equal(pairs, np.stack([np.arange(count)] * 2, axis=1))
 
 
 @given(STAMPS.filter(lambda stamps: len(stamps) <= 10), st.integers(1, 12))

@@ -29,25 +29,33 @@ SESSION_LOG: Final = "/session/log"
 
 @dataclass(frozen=True)
 class Topic:
-    """A topic, its protobuf schema, and the kind of message that it carries."""
+    """A topic, its protobuf schema, and the kind of message that it carries.
+
+    A ``periodic`` one has a message every so often, so that one that is missing shows; others speak when there is
+    something to say.
+    """
 
     name: str
     schema: str
     message: type[Message]
+    periodic: bool = False
 
 
 TOPICS: Final = (
-    Topic(LIDAR_SCAN, "foxglove.LaserScan", LidarScan),
-    Topic(CAMERA_IMAGE, "foxglove.CompressedImage", CameraImage),
+    Topic(LIDAR_SCAN, "foxglove.LaserScan", LidarScan, periodic=True),
+    Topic(CAMERA_IMAGE, "foxglove.CompressedImage", CameraImage, periodic=True),
     Topic(CAMERA_CALIBRATION, "foxglove.CameraCalibration", CameraCalibration),
     Topic(TRANSFORM, "foxglove.FrameTransform", FrameTransform),
-    Topic(ODOMETRY, "foxglove.PoseInFrame", Odometry),
-    Topic(OPERATOR_POSE, "foxglove.PoseInFrame", OperatorPose),
-    Topic(COMMAND, "sdt.MotionCommand", MotionCommand),
+    Topic(ODOMETRY, "foxglove.PoseInFrame", Odometry, periodic=True),
+    Topic(OPERATOR_POSE, "foxglove.PoseInFrame", OperatorPose, periodic=True),
+    Topic(COMMAND, "sdt.MotionCommand", MotionCommand, periodic=True),
     Topic(OPERATOR_STATE, "sdt.OperatorState", OperatorState),
     Topic(SESSION_LOG, "foxglove.Log", LogEntry),
 )
 """Everything that a recording holds; each kind of message has one topic."""
+
+SENSORS: Final = (LIDAR_SCAN, CAMERA_IMAGE, ODOMETRY)
+"""Topics whose stamps are a sensor's."""
 
 TOPIC_BY_NAME: Final = {topic.name: topic for topic in TOPICS}
 _TOPIC_BY_MESSAGE: Final = {topic.message: topic for topic in TOPICS}

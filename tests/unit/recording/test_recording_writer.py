@@ -12,6 +12,7 @@ from recording_samples import CONFIG, INFO, T0, image, one_of_each, read_by_mcap
 
 from sdt_tools.errors import OutputExistsError, RecordingError
 from sdt_tools.protocols import SourceInfo
+from sdt_tools.recording.inspect import inspect_recording
 from sdt_tools.recording.reader import Recording
 from sdt_tools.recording.writer import RecordingWriter
 
@@ -194,6 +195,7 @@ def test_a_full_disk_is_said_and_the_file_stays_whole(tmp_path: Path) -> None:
         assert len(recording.scans()) == len(read) == recording.topics["/lidar/scan"].count
         assert int(recording.stats["count./lidar/scan"]) == len(read)
         assert int(recording.stats["lost"]) == written + 1 - len(read)
+    assert inspect_recording(path, full=True).disagreements == ()  # the stats are of what is in the file
 
 
 def test_closing_twice_is_closing_once(tmp_path: Path) -> None:
@@ -224,3 +226,4 @@ def test_where_the_end_has_no_room_the_last_chunks_make_some(tmp_path: Path, sca
         lost = int(recording.stats.get("lost", 0))
     assert bool(lost) == bool(refused)
     assert len(read) + lost == writer.counts.total()
+    assert inspect_recording(path, full=True).disagreements == ()
