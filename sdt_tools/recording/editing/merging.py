@@ -66,10 +66,13 @@ def write_merged(plan: Merge, path: Path) -> EditedRecording:
 
 
 def _numbered(place: int, source: McapReader, needless: frozenset[Carried]) -> Iterator[_Numbered]:
+    """The messages of ``source``, but for each of ``needless`` one that is it."""
     left_out = {(c.topic, c.at_ns, c.publish_ns, c.crc32) for c in needless}
     moments = {c.at_ns for c in needless}
     for entry in source.entries():
-        if entry.log_ns not in moments or place_of(source, entry) not in left_out:
+        if entry.log_ns in moments and (found := place_of(source, entry)) in left_out:
+            left_out.remove(found)
+        else:
             yield place, entry
 
 

@@ -8,6 +8,7 @@ from recording_samples import CONFIG, INFO, T0, image, scan, write
 
 from sdt_tools.clock import SECOND_NS
 from sdt_tools.errors import OutputExistsError, RecordingError, UsageError
+from sdt_tools.frames import Received
 from sdt_tools.recording.editing.edit import edit_recordings, edit_under_way
 from sdt_tools.recording.editing.plan import (
     plan_drop_interval,
@@ -111,6 +112,27 @@ def test_a_carried_message_stays_where_its_original_is_not(tmp_path: Path) -> No
     edit_recordings(plan_trim(path, None, "1.4", tmp_path / "cut.mcap"))
     edit_recordings(plan_drop_interval(tmp_path / "cut.mcap", "0.3", "1.2", tmp_path / "dropped.mcap"))
     assert told(tmp_path / "merged.mcap") == told(tmp_path / "dropped.mcap")
+
+
+def test_parts_of_parts_know_where_what_they_carry_came_from(tmp_path: Path) -> None:
+    path = recorded(tmp_path)
+    edit_recordings(plan_trim(path, None, "0.25", tmp_path / "first.mcap"))
+    edit_recordings(plan_trim(path, "0.25", None, tmp_path / "rest.mcap"))
+    parts = [part.out for part in edit_recordings(plan_split(tmp_path / "rest.mcap", ["0.1", "0.2"], tmp_path))]
+    edit_recordings(plan_merge(parts, tmp_path / "rest_again.mcap"))
+    assert told(tmp_path / "rest_again.mcap") == told(tmp_path / "rest.mcap")
+    edit_recordings(plan_merge([tmp_path / "first.mcap", *parts], tmp_path / "new.mcap"))
+    assert told(tmp_path / "new.mcap") == told(path)
+    edit_recordings(plan_merge([tmp_path / "first.mcap", *parts[1:]], tmp_path / "gap.mcap"))
+    assert told(tmp_path / "gap.mcap") == sorted(within(told(path), 0, 0.25) + within(told(path), 0.35, 2))
+
+
+def test_a_message_that_equals_the_carried_one_is_kept(tmp_path: Path) -> None:
+    again = [tf(T0, "lidar", 0.1), Received(T0 + 20, tf(T0, "lidar", 0.1).message), scan(1)]
+    path = write(tmp_path / "drive.mcap", again)
+    parts = edit_recordings(plan_split(path, [f"{T0 + 20}ns"], tmp_path))
+    edit_recordings(plan_merge([part.out for part in parts], tmp_path / "new.mcap"))
+    assert told(tmp_path / "new.mcap") == told(path)
 
 
 def test_the_new_recording_says_what_was_done_to_which(tmp_path: Path) -> None:
