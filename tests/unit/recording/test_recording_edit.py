@@ -1,4 +1,5 @@
 import json
+import tracemalloc
 from pathlib import Path
 
 import pytest
@@ -272,6 +273,19 @@ def test_nothing_is_written_over_even_if_it_comes_late(tmp_path: Path) -> None:
         (tmp_path / "drive_02.mcap").write_text("mine")
     assert (tmp_path / "drive_02.mcap").read_text() == "mine"
     assert sorted(p.name for p in tmp_path.iterdir()) == ["drive.mcap", "drive_02.mcap"]
+
+
+def test_memory_does_not_grow_with_the_recording(tmp_path: Path) -> None:
+    path = write(tmp_path / "drive.mcap", (image(number, 100_000) for number in range(300)))
+    tracemalloc.start()
+    try:
+        parts = edit_recordings(plan_split(path, ["1"], tmp_path))
+        edit_recordings(plan_merge([part.out for part in parts], tmp_path / "new.mcap"))
+        _, peak_bytes = tracemalloc.get_traced_memory()
+    finally:
+        tracemalloc.stop()
+    assert path.stat().st_size > 30_000_000
+    assert peak_bytes < 12_000_000
 
 
 def test_the_drive_has_what_these_tests_need() -> None:
