@@ -141,13 +141,8 @@ def _print(edited: "tuple[EditedRecording, ...]", journals: "tuple[FollowedJourn
     for original in edited[0].originals:
         if original.truncated:
             console.print(f"{original.path}: is cut off; it was read up to where it stops", soft_wrap=True)
-        for damage in dict.fromkeys(
-            d for new in edited for o in new.originals if o.path == original.path for d in o.damage
-        ):
-            lost = f"lost from {damage.start_ns} to {damage.end_ns} ns: {damage.reason}"
-            console.print(f"{original.path}: {lost}", soft_wrap=True)
-    damage = dict.fromkeys((o.path, met) for new in edited for o in new.originals for met in o.damage)
-    for path, met in damage:
+    damaged = dict.fromkeys((o.path, met) for new in edited for o in new.originals for met in o.damage)
+    for path, met in damaged:
         console.print(f"{path}: lost from {met.start_ns} to {met.end_ns} ns: {met.reason}", soft_wrap=True)
     for journal in journals:
         console.print(f"{journal.path}: {journal.acts:,} of {journal.given:,} acts", soft_wrap=True)

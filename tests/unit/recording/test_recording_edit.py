@@ -1,4 +1,6 @@
 import json
+import resource
+import signal
 import tracemalloc
 from pathlib import Path
 
@@ -8,7 +10,7 @@ from mcap.reader import make_reader
 from recording_samples import CONFIG, INFO, T0, image, scan, write
 
 from sdt_tools.clock import SECOND_NS
-from sdt_tools.errors import OutputExistsError, RecordingError, UsageError
+from sdt_tools.errors import DiskRefusedError, OutputExistsError, RecordingError, UsageError
 from sdt_tools.frames import Received
 from sdt_tools.recording.editing.edit import edit_recordings, edit_under_way
 from sdt_tools.recording.editing.plan import (
@@ -273,6 +275,21 @@ def test_nothing_is_written_over_even_if_it_comes_late(tmp_path: Path) -> None:
         (tmp_path / "drive_02.mcap").write_text("mine")
     assert (tmp_path / "drive_02.mcap").read_text() == "mine"
     assert sorted(p.name for p in tmp_path.iterdir()) == ["drive.mcap", "drive_02.mcap"]
+
+
+def test_a_disk_that_fills_leaves_nothing_behind(tmp_path: Path) -> None:
+    path = write(tmp_path / "drive.mcap", (image(number, 100_000) for number in range(60)))
+    plan = plan_split(path, ["1"], tmp_path)
+    before = resource.getrlimit(resource.RLIMIT_FSIZE)
+    ignored = signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (2_000_000, before[1]))
+    try:
+        with pytest.raises(DiskRefusedError, match=r"drive_01\.mcap.*cannot be written after .* MB: File too large"):
+            edit_recordings(plan)
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, before)
+        signal.signal(signal.SIGXFSZ, ignored)
+    assert [p.name for p in tmp_path.iterdir()] == ["drive.mcap"]
 
 
 def test_memory_does_not_grow_with_the_recording(tmp_path: Path) -> None:
