@@ -18,6 +18,7 @@ VERBS = (
     "record",
     "inspect",
     "repair",
+    "edit",
     "import",
     "label",
     "dataset",

@@ -97,11 +97,11 @@ class Recording:
     @property
     def recording_id(self) -> str:
         """The recording's UUID; for files without one, derived from how they begin."""
-        return self.session.get("recording_id") or self._derived_id
+        return self._recording_id
 
     @cached_property
-    def _derived_id(self) -> str:
-        return derived_id("foreign", str(self.size_bytes), str(zlib.crc32(self._file.beginning)))
+    def _recording_id(self) -> str:
+        return recording_id_of(self._file)
 
     @property
     def config_toml(self) -> str:
@@ -187,3 +187,9 @@ class Recording:
         counts = self._file.counts or {}
         count = sum(counts.get(number, 0) for number in self._numbers((LIDAR_SCAN,)))
         return count if count * SCAN_MIN_BYTES <= self.size_bytes else 0
+
+
+def recording_id_of(file: McapReader) -> str:
+    """The UUID of the recording in ``file``, as ``Recording.recording_id`` has it, whatever topics are in it."""
+    said = [record.metadata.get("recording_id", "") for record in file.metadata if record.name == SESSION]
+    return (said[-1] if said else "") or derived_id("foreign", str(file.size_bytes), str(zlib.crc32(file.beginning)))

@@ -10,12 +10,11 @@ from sdt_tools.cli.app import VERBS, app
 HEAVY = ("cv2", "matplotlib", "mcap", "numba", "numpy", "polars", "pydantic", "pymunk", "rerun", "torch")
 
 
-def every_command() -> list[list[str]]:
-    root = get_command(app)
+def every_command(group: object = None) -> list[list[str]]:
     paths = []
-    for verb, command in root.commands.items():  # type: ignore[attr-defined]
-        paths.append([verb])
-        paths += [[verb, name] for name in getattr(command, "commands", {})]
+    for name, command in getattr(group or get_command(app), "commands", {}).items():
+        below = every_command(command) if hasattr(command, "commands") else []
+        paths += [[name], *([name, *words] for words in below)]
     return paths
 
 

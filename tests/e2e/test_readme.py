@@ -5,6 +5,7 @@ import os
 import re
 import subprocess
 import sys
+from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
@@ -89,13 +90,13 @@ def test_what_is_made_smaller_is_in_the_readme() -> None:
 
 def test_every_verb_is_in_the_table() -> None:
     named = set(re.findall(r"^\| `sdt ([a-z -]+)`", README, re.MULTILINE))
-    root = get_command(app)
-    commands = {
-        " ".join([verb, *rest])
-        for verb, command in root.commands.items()  # type: ignore[attr-defined]
-        for rest in ([[name] for name in getattr(command, "commands", {})] or [[]])
-    }
-    assert named == commands
+    assert named == set(calls(get_command(app)))
+
+
+def calls(command: object) -> Iterator[str]:
+    """The words that lead to each command below ``command``."""
+    for name, below in getattr(command, "commands", {}).items():
+        yield from (f"{name} {words}" for words in calls(below)) if hasattr(below, "commands") else [name]
 
 
 def test_links_to_files_lead_somewhere() -> None:
