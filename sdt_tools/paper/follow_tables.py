@@ -117,6 +117,32 @@ def failures_by_motion(tables: FollowTables, families: Sequence[str]) -> list[di
     return rows
 
 
+def cost_rows(tables: FollowTables) -> list[dict[str, Any]]:
+    """What level 4 costs the gate against level 0 of the plain network, on each size of data, in shares.
+
+    Losses are level 0's median less level 4's; ``pasted_forward`` is the worst network's, ``clip_loss`` what the median
+    forward recall on clear fronts loses when ranges are clipped at 4 m.
+    """
+    rows = []
+    for size in ("paper", "large"):
+        families = [f"{size}-plain-level0", f"{size}-gate-level4"]
+        pair = level_rows(tables, families)
+        checks = tables.checks.get(families[1])
+        if len(pair) < len(families) or checks is None:
+            continue
+        zero, four = pair
+        rows.append(
+            {
+                "size": size,
+                "accuracy_loss": zero["val_accuracy"][1] - four["val_accuracy"][1],
+                "forward_recall_loss": zero["val_forward_recall"][1] - four["val_forward_recall"][1],
+                "pasted_forward": checks["pasted_forward"]["worst"],
+                "clip_loss": checks["clear_forward"]["median"] - checks["clear_forward_clipped_4m"]["median"],
+            }
+        )
+    return rows
+
+
 def sweep_rows(tables: FollowTables) -> list[dict[str, Any]]:
     """Accuracies of plain networks of the paper's size by level and λ."""
     plain = tables.networks.filter((pl.col("arch") == "plain") & (pl.col("size") == "paper") & (pl.col("level") > 0))

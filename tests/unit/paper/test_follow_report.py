@@ -11,6 +11,7 @@ from sdt_tools.paper.follow_models import MAIN, Family, settings, swept
 from sdt_tools.paper.follow_report import FAMILIES, write_follow_report
 from sdt_tools.paper.follow_tables import (
     FollowTables,
+    cost_rows,
     failures_by_motion,
     level_rows,
     nesting_rows,
@@ -83,7 +84,9 @@ def tables() -> FollowTables:
                         for step in range(5)
                     ]
     searched = {"model": "large-gate-level4-seed0", "config": {"attack": {"restarts": 1000}}, "error": 0}
-    checks = {family: {"pasted_forward": {"median": 0.0, "worst": 0.1}} for family in FAMILIES}
+    rates = {"pasted_forward": (0.0, 0.1), "clear_forward": (0.9, 0.8), "clear_forward_clipped_4m": (0.85, 0.8)}
+    check = {name: {"median": median, "worst": worst} for name, (median, worst) in rates.items()}
+    checks = dict.fromkeys(FAMILIES, check)
     return FollowTables(pl.DataFrame(networks), pl.DataFrame(runs), pl.DataFrame(traces), searched, checks, 300.0)
 
 
@@ -148,3 +151,11 @@ def test_families_differ_in_what_they_are_named_after() -> None:
     plain = [settings(Family("paper", "plain", level), 0, config) for level in (1, 2, 3)]
     assert len({one.safety.model_dump_json() for one in plain}) == 1
     assert {family.weight for family in swept(config)} == set(config.swept_weights)
+
+
+def test_what_level_four_costs_is_said_for_both_sizes_of_data(tables: FollowTables) -> None:
+    rows = cost_rows(tables)
+    assert [row["size"] for row in rows] == ["paper", "large"]
+    assert rows[0]["accuracy_loss"] == pytest.approx(0.0)
+    assert rows[0]["pasted_forward"] == 0.1
+    assert rows[0]["clip_loss"] == pytest.approx(0.05)
