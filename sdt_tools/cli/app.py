@@ -19,6 +19,7 @@ VERBS = (
     "inspect",
     "repair",
     "import",
+    "export",
     "label",
     "dataset",
     "domains",

@@ -88,7 +88,7 @@ def check_readable(path: Path, messages: int) -> None:
     try:
         with path.open("rb") as stream:
             reader = make_reader(stream, validate_crcs=True)
-            found = sum(1 for _ in reader.iter_messages(log_time_order=False))
+            found = sum(1 for _ in reader.iter_messages())
     except Exception as error:
         raise RecordingError(f"{path}: what was written does not read back ({error}); check the disk") from None
     if found != messages:
