@@ -88,7 +88,7 @@ def test_what_is_made_smaller_is_in_the_readme() -> None:
 
 
 def test_every_verb_is_in_the_table() -> None:
-    named = set(re.findall(r"^\| `sdt ([a-z -]+)`", README, re.MULTILINE))
+    named = set(re.findall(r"^\| `sdt ([a-z0-9 -]+)`", README, re.MULTILINE))
     root = get_command(app)
     commands = {
         " ".join([verb, *rest])
