@@ -20,6 +20,7 @@ VERBS = (
     "repair",
     "edit",
     "import",
+    "export",
     "label",
     "dataset",
     "domains",

@@ -3,6 +3,7 @@
 import json
 import sys
 from collections.abc import Mapping
+from pathlib import Path
 from typing import Annotated, Any
 
 import typer
@@ -17,3 +18,14 @@ def emit(document: Mapping[str, Any]) -> None:
     """Print ``document`` as the one JSON document of this command."""
     json.dump(document, sys.stdout, indent=2, default=str)
     sys.stdout.write("\n")
+
+
+def print_messages(path: Path, messages: Mapping[str, int]) -> None:
+    """Print how many messages of each topic are in ``path``."""
+    from rich.table import Table
+
+    table = Table("topic", "messages")
+    for topic, count in messages.items():
+        table.add_row(topic, str(count))
+    console.print(f"{path}: {sum(messages.values())} messages")
+    console.print(table)

@@ -56,7 +56,7 @@ def workplace(tmp_path: Path) -> Path:
 
 
 def test_the_commands_run_in_the_order_they_are_given(workplace: Path) -> None:
-    assert len(blocks()) == 5
+    assert len(blocks()) == 6
     script = "".join(blocks())
     for said, small in SMALLER.items():
         script = script.replace(said, small)
@@ -89,7 +89,7 @@ def test_what_is_made_smaller_is_in_the_readme() -> None:
 
 
 def test_every_verb_is_in_the_table() -> None:
-    named = set(re.findall(r"^\| `sdt ([a-z -]+)`", README, re.MULTILINE))
+    named = set(re.findall(r"^\| `sdt ([a-z0-9 -]+)`", README, re.MULTILINE))
     assert named == set(calls(get_command(app)))
 
 

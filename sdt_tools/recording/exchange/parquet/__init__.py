@@ -1,0 +1,1 @@
+"""Parquet, one file a topic, in and out."""
