@@ -8,7 +8,7 @@ import typer
 from sdt_tools.cli.console import JsonFlag, console, emit
 
 if TYPE_CHECKING:
-    from sdt_tools.recording.live.loop import RecordingSummary
+    from sdt_tools.recording.live.outcome import RecordingSummary
 
 app = typer.Typer(no_args_is_help=True, help="Record scans, images, poses and commands in step into one MCAP file.")
 

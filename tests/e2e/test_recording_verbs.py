@@ -18,7 +18,7 @@ from sdt_tools.models.card import ModelCard
 from sdt_tools.models.checkpoint import load_checkpoint, save_checkpoint
 from sdt_tools.models.follow_net import FollowNet, FollowNetConfig, new_follow_net
 from sdt_tools.models.preprocess import PreprocessConfig
-from sdt_tools.recording.live.loop import RecordingProgress
+from sdt_tools.recording.live.outcome import RecordingProgress
 from sdt_tools.recording.reader import Recording
 
 SHORT = ["record", "scene", "--scenario", "plain", "--seed", "7", "--no-camera"]
