@@ -1,7 +1,7 @@
 """The progress of a recording on stderr: time, messages a second by topic, size, what was lost."""
 
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 
@@ -24,9 +24,14 @@ def recording_progress(what: str) -> Iterator[Callable[[RecordingProgress], None
         TextColumn("eta"),
         TimeRemainingColumn(),
     )
-    with Progress(*columns, console=console, transient=True, disable=not console.is_terminal) as bar:
-        task = bar.add_task(what, total=None, state="")
+    bar = Progress(*columns, console=console, transient=True, disable=not console.is_terminal)
+    task = bar.add_task(what, total=None, state="")
+    bar.start()
+    try:
         yield lambda now: bar.update(task, completed=now.recorded_s, total=now.total_s, state=describe(now))
+    finally:
+        with suppress(OSError):  # a terminal that has hung up
+            bar.stop()
 
 
 def describe(now: RecordingProgress) -> str:

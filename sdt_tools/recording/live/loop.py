@@ -51,8 +51,8 @@ class Recorder(Protocol):
         """Do what is due; each entry is to be recorded before the next is asked for."""
         ...
 
-    def time_up(self, now_ns: int) -> None:
-        """``end_ns`` has come; ``ending`` may change."""
+    def time_up(self, now_ns: int) -> Iterable[LogEntry]:
+        """``end_ns`` has come; ``ending`` may change. As ``tick``."""
         ...
 
     def last_words(self, now_ns: int) -> Iterable[LogEntry]:
@@ -153,7 +153,7 @@ class LiveLoop:
             if end_ns is not None and now_ns >= end_ns:
                 self._read(end_ns - 1)
                 self._now_ns = end_ns
-                recorder.time_up(end_ns)
+                self._log_all(recorder.time_up(end_ns))
                 if recorder.ending is not None:
                     return recorder.ending
             self._read(now_ns)

@@ -1,6 +1,7 @@
 """When the loop's ticks come."""
 
 from collections.abc import Callable
+from time import sleep
 from typing import Protocol, runtime_checkable
 
 from sdt_tools.clock import SECOND_NS, HostClock, Pacer
@@ -52,3 +53,10 @@ class RealPace:
         """Wait for the next tick; the host's time then."""
         self._pacer.wait()
         return self._clock.now_ns()
+
+
+def paced(
+    start_ns: int, scan_hz: float, clock: HostClock | None, sleep_s: Callable[[float], None] = sleep
+) -> FastPace | RealPace:
+    """A tick a scan, at the pace of ``clock``; without one, as fast as it can."""
+    return FastPace(start_ns, scan_hz) if clock is None else RealPace(clock, scan_hz, sleep_s)

@@ -14,7 +14,7 @@ from sdt_tools.recording.live.disk import DiskWatch
 from sdt_tools.recording.live.interrupt import Interrupt, deferred_interrupt
 from sdt_tools.recording.live.loop import LiveLoop
 from sdt_tools.recording.live.outcome import Ending, RecordingProgress, RecordingSummary
-from sdt_tools.recording.live.pace import FastPace, RealPace
+from sdt_tools.recording.live.pace import paced
 from sdt_tools.recording.live.pressure import QueueLimits
 from sdt_tools.recording.live.sink import DirectSink, QueuedSink
 from sdt_tools.recording.live.take import Take, Tally, stats_of
@@ -51,9 +51,7 @@ def record(
     Raises RunError where the source fails, after a word in ``/session/log``; RecordingError where the disk refuses.
     """
     decisions = DecisionLoop(Deciders(driver, expert, perturb), motions, rates.follow_hz, source.start_ns)
-    pace = (
-        RealPace(clock or HostClock(), rates.scan_hz, sleep_s) if realtime else FastPace(source.start_ns, rates.scan_hz)
-    )
+    pace = paced(source.start_ns, rates.scan_hz, (clock or HostClock()) if realtime else None, sleep_s)
     sink = QueuedSink(writer, limits, disk) if realtime else DirectSink(writer)
 
     def tally() -> Tally:
@@ -103,10 +101,11 @@ class _OneTake:
         if self._take.space is not None and self._take.space.full:
             self.ending = Ending.DISK
 
-    def time_up(self, now_ns: int) -> None:
+    def time_up(self, now_ns: int) -> list[LogEntry]:
         """Enough."""
         del now_ns
         self.ending = Ending.TIME
+        return []
 
     def last_words(self, now_ns: int) -> list[LogEntry]:
         """Drops that are not told yet."""
@@ -114,7 +113,8 @@ class _OneTake:
 
     def end(self, ending: Ending, now_ns: int) -> None:
         """Note what came of it. Raises what the writer met while the last messages were written."""
-        self.summary = self._take.finish(ending, now_ns)
+        self._take.stop(now_ns)
+        self.summary = self._take.finish(ending)
         self._writer.note(stats_of(self.summary))
         if self._take.sink.failure is not None and ending is not Ending.FAILED:
             raise self._take.sink.failure

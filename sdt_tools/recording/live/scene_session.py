@@ -11,7 +11,7 @@ from sdt_tools.config import Config, dump_config
 from sdt_tools.protocols import Driver, Observer
 from sdt_tools.recording.live.interrupt import Interrupt, deferred_interrupt
 from sdt_tools.recording.live.outcome import RecordingProgress, RecordingSummary
-from sdt_tools.recording.live.perturb import Perturbation, PerturbConfig
+from sdt_tools.recording.live.perturb import PerturbConfig, perturbation_of
 from sdt_tools.recording.live.record import record
 from sdt_tools.recording.session import random_id
 from sdt_tools.recording.writer import RecordingWriter
@@ -65,12 +65,12 @@ def _record_scene(
     clock = HostClock()
     layout = layout_for(config.scenario, config.seed)
     if config.realtime:
-        _warm_up(layout, config)
+        warm_up(layout, config)
     start_ns = clock.now_ns() if config.realtime else FAST_EPOCH_NS
     source = SceneSource(layout, config.scene, config.camera, start_ns)
     driver = make_driver(config.driver, source)
     rates = config.scene.rates
-    perturb = Perturbation(config.seed, config.perturb, rates.follow_hz) if config.perturb is not None else None
+    perturb = perturbation_of(config.perturb, config.seed, rates.follow_hz)
     with RecordingWriter(
         out,
         source.info,
@@ -99,7 +99,7 @@ def _record_scene(
     return replace(summary, size_bytes=writer.size)
 
 
-def _warm_up(layout: Layout, config: SceneRecordingConfig) -> None:
+def warm_up(layout: Layout, config: SceneRecordingConfig) -> None:
     """Import and compile what the scene needs, so that it can keep the pace from its first second on."""
     scene = SceneSource(layout, config.scene, config.camera)
     for _ in scene.read(scene.start_ns):

@@ -23,6 +23,13 @@ class Tally:
     missed: int
 
 
+@dataclass(frozen=True)
+class _Ended:
+    seconds: float
+    wall_s: float
+    tally: Tally
+
+
 class Take:
     """A recording from ``start_ns`` on, of ``seconds`` without its pauses, or until somebody ends it.
 
@@ -39,6 +46,7 @@ class Take:
         self._before = tally()
         self._began_s = perf_counter()
         self._warned = False
+        self._ended: _Ended | None = None
         self._paused_at_ns: int | None = None
         self._pauses_ns: list[tuple[int, int]] = []
         self._gaps = {
@@ -111,29 +119,31 @@ class Take:
             if space.low:
                 yield LogEntry(now_ns, LogLevel.WARNING, _low(space), "disk")
 
-    def finish(self, ending: Ending, now_ns: int) -> RecordingSummary:
-        """Wait until all is with the writer; what was recorded up to ``now_ns``.
+    def stop(self, now_ns: int) -> None:
+        """Nothing comes after ``now_ns``: what was counted up to here is this take's."""
+        self.resume(now_ns)
+        self._ended = _Ended(self.recorded_s(now_ns), perf_counter() - self._began_s, self._tally())
+
+    def finish(self, ending: Ending) -> RecordingSummary:
+        """After ``stop``, in whatever thread: wait until all is with the writer; what was recorded.
 
         Where the writer has failed by then, the ending is FAILED and ``sink.failure`` says why.
         """
-        self.resume(now_ns)
+        assert self._ended is not None
         self.sink.finish()
-        return self._summary(Ending.FAILED if self.sink.failure is not None else ending, now_ns)
-
-    def _summary(self, ending: Ending, now_ns: int) -> RecordingSummary:
-        tally = self._tally()
+        ended, before = self._ended, self._before
         missing = {topic: gap.missing for topic, gap in self._gaps.items()}
         return RecordingSummary(
             recording_id=self.sink.recording_id,
-            ending=ending,
-            seconds=self.recorded_s(now_ns),
-            wall_s=perf_counter() - self._began_s,
+            ending=Ending.FAILED if self.sink.failure is not None else ending,
+            seconds=ended.seconds,
+            wall_s=ended.wall_s,
             frames=dict(sorted(self.sink.counts.items())),
             dropped=dict.fromkeys(missing, 0) | dict(sorted(self.sink.dropped.items())),
             missing=missing,
-            missed_deadlines=tally.missed - self._before.missed,
-            decisions=tally.decisions - self._before.decisions,
-            forced=tally.forced - self._before.forced,
+            missed_deadlines=ended.tally.missed - before.missed,
+            decisions=ended.tally.decisions - before.decisions,
+            forced=ended.tally.forced - before.forced,
             size_bytes=self.sink.size,
             pauses_ns=tuple(self._pauses_ns),
         )
