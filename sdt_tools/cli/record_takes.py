@@ -76,11 +76,12 @@ def session_document(summary: "SessionSummary") -> dict[str, object]:
 
 def print_session(summary: "SessionSummary") -> None:
     """The session for people."""
-    from rich.table import Table
+    from rich.markup import escape
+    from rich.table import Column, Table
 
-    table = Table("take", "seconds", "messages", "dropped", "missing", "ended by", "")
+    table = Table(Column("take", no_wrap=True), "seconds", "messages", "dropped", "missing", "ended by", "")
     for take in summary.record.takes:
-        remark = f"in {take.trash}" if take.trash else take.trigger
+        remark = "discarded" if take.trash else escape(take.trigger)
         numbers = (f"{take.seconds:.1f}", str(take.messages), str(take.dropped), str(take.missing))
         table.add_row(take.name, *numbers, take.ending or "cut off", remark)
     console.print(table)

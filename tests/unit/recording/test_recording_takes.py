@@ -1,5 +1,6 @@
 """Sessions: take after take under somebody's controls, resumed, and the last seconds kept."""
 
+import os
 import tomllib
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
@@ -36,6 +37,12 @@ from sdt_tools.recording.live.take import Tally
 from sdt_tools.recording.live.takes import TakeRecorder
 from sdt_tools.recording.reader import Recording
 from sdt_tools.recording.writer import RecordingWriter
+
+
+@pytest.fixture(autouse=True)
+def _no_waiting_for_the_disk(monkeypatch: pytest.MonkeyPatch) -> None:
+    """What a power cut would leave is not asked here, and disks take their time."""
+    monkeypatch.setattr(os, "fsync", lambda _descriptor: None)
 
 
 class Settings(Config):
