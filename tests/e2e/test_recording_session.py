@@ -187,14 +187,23 @@ def test_without_a_terminal_a_session_takes_one_take_a_call(tmp_path: Path) -> N
     assert len(takes(tmp_path / "s")) == 2
 
 
-def test_what_led_to_an_event_is_kept_without_a_terminal_too(tmp_path: Path) -> None:
-    call = [*SHORT, "--session", str(tmp_path / "s"), "--keep-last", "2s", "--seconds", "20", "--json"]
-    told = json.loads(CliRunner().invoke(app, call).stdout)
-    assert [take["name"] for take in told["takes"]] == [f"event_{n + 1:03d}.mcap" for n in range(len(told["takes"]))]
-    for take in told["takes"]:
-        with Recording.open(tmp_path / "s" / take["name"]) as recording:
-            assert recording.session["trigger"] == take["trigger"] != ""
-            assert 0 < len(recording.scans()) <= 100
+ROOM = """
+name = "my_room"
+operator = { path = [[1.0, 0.0], [4.0, 0.5]], speed_mps = 0.5 }
+wall = [{ from = [-2, -3], to = [8, -3] }]
+gestures = [{ at_s = 3, gesture = "enable" }]
+"""
+
+
+def test_what_led_to_a_change_of_mode_is_kept_without_a_terminal_too(tmp_path: Path) -> None:
+    (tmp_path / "room.toml").write_text(ROOM)
+    call = ["record", "scene", "--no-camera", "--scenario", str(tmp_path / "room.toml"), "--seconds", "6"]
+    result = CliRunner().invoke(app, [*call, "--session", str(tmp_path / "s"), "--keep-last", "2s", "--json"])
+    (take,) = json.loads(result.stdout)["takes"]
+    assert (take["name"], take["trigger"]) == ("event_001.mcap", "operator asks for mode: active")
+    with Recording.open(tmp_path / "s" / "event_001.mcap") as recording:
+        assert recording.session["trigger"] == take["trigger"]
+        assert len(recording.scans()) == 100
 
 
 @pytest.mark.parametrize(
