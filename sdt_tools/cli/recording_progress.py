@@ -52,7 +52,6 @@ def _disk(left_s: float | None) -> list[str]:
         return []
     if left_s >= 24 * 3600:
         return ["disk > 1 day"]
-    text = (
-        f"{left_s / 3600:.1f} h" if left_s >= 3600 else f"{left_s / 60:.0f} min" if left_s >= 60 else f"{left_s:.0f} s"
-    )
-    return [f"DISK FULL IN {text}" if left_s < WARNING_S else f"disk {text}"]
+    if left_s < WARNING_S:
+        return [f"DISK FULL IN {left_s / 60:.1f} min"]
+    return [f"disk {left_s / 3600:.1f} h" if left_s >= 3600 else f"disk {left_s / 60:.0f} min"]
