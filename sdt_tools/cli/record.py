@@ -1,14 +1,25 @@
 """``sdt record``: recordings."""
 
+import re
+import signal
+import sys
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from sdt_tools.cli.console import JsonFlag, console, emit
+from sdt_tools.errors import UsageError
 
 if TYPE_CHECKING:
-    from sdt_tools.recording.live.loop import RecordingSummary
+    from sdt_tools.recording.live.outcome import Ending, RecordingSummary
+
+KEYS_HELP = (
+    "Keys with --session at a terminal: space pauses and resumes, n ends the take and starts the next, k keeps it and "
+    "stops, x discards it (or the last one) to the trash, m marks the moment, s saves what --keep-last holds, q quits."
+)
 
 app = typer.Typer(no_args_is_help=True, help="Record scans, images, poses and commands in step into one MCAP file.")
 
@@ -18,13 +29,13 @@ def record() -> None:
     """Record scans, images, poses and commands in step into one MCAP file."""
 
 
-@app.command("scene")
+@app.command("scene", epilog=KEYS_HELP)
 def scene(
-    out: Annotated[Path, typer.Option(help="The recording to write; it must not exist.")],
+    out: Annotated[Path | None, typer.Option(help="The recording to write; it must not exist.")] = None,
     scenario: Annotated[str, typer.Option(help="Name or TOML file of a scenario, or 'practice'.")] = "plain",
     seed: Annotated[int, typer.Option(min=0, help="Everything random comes from it.")] = 0,
     seconds: Annotated[
-        float | None, typer.Option(min=0.02, help="How long to record; without, until the scenario ends.")
+        float | None, typer.Option(min=0.02, help="How long to record, a take; without, until the scenario ends.")
     ] = None,
     driver: Annotated[
         str, typer.Option(help="Who drives: expert, constant:CLASS or policy:MODEL_DIR.", metavar="NAME")
@@ -39,10 +50,25 @@ def scene(
     config: Annotated[
         Path | None, typer.Option(help="TOML file about the scene: tables rates, motions, sensor, drive; linger_s.")
     ] = None,
+    session: Annotated[
+        Path | None, typer.Option(help="Instead of --out: a folder for take after take.", metavar="DIR")
+    ] = None,
+    resume: Annotated[bool, typer.Option("--resume", help="Go on with the session that DIR holds.")] = False,
+    keep_last: Annotated[
+        str | None,
+        typer.Option(
+            help="With --session: no take at first, but the last seconds in memory, as in 30s or 2min, written out "
+            "at a key, a change of mode, or an error.",
+            metavar="TIME",
+        ),
+    ] = None,
     json_output: JsonFlag = False,
 ) -> None:
-    """Record the simulated robot. The same options give the same bytes, except with --realtime."""
-    from sdt_tools.cli.drivers import make_driver
+    """Record the simulated robot. The same options give the same bytes, except with --realtime.
+
+    In real time the recording ends, whole, when its disk has no room left. It ends whole on Ctrl-C too, and on SIGTERM
+    and SIGHUP (exit codes 143 and 129).
+    """
     from sdt_tools.cli.recording_progress import recording_progress
     from sdt_tools.config import load_config, parse_config
     from sdt_tools.recording.live.perturb import PerturbConfig
@@ -59,13 +85,67 @@ def scene(
         "perturb": PerturbConfig() if perturb else None,
         "scene": load_config(SceneConfig, config),
     }
+    if (out is None) == (session is None):
+        raise UsageError("name either --out, for one recording, or --session, for takes")
+    if session is not None:
+        _scene_session(values, session, resume, keep_last, json_output)
+        return
+    if resume or keep_last is not None:
+        raise UsageError(f"{'--resume' if resume else '--keep-last'} needs --session, the folder of the takes")
+    from sdt_tools.cli.drivers import make_driver
+
+    assert out is not None
     recording = parse_config(SceneRecordingConfig, values, "record scene")
     with recording_progress(f"recording {out.name}") as progress:
         summary = record_scene(recording, out, make_driver, progress=progress)
-    if json_output:
-        emit(_document(out, summary))
-    else:
-        _print(out, summary)
+    with _last_words(summary.ending):
+        if json_output:
+            emit(_document(out, summary))
+        else:
+            _print(out, summary)
+
+
+def _scene_session(
+    values: Mapping[str, object], folder: Path, resume: bool, keep_last: str | None, json_output: bool
+) -> None:
+    from sdt_tools.cli.record_takes import print_session, record_takes, session_document
+    from sdt_tools.config import parse_config
+    from sdt_tools.recording.live.scene_takes import SceneTakesConfig
+
+    keep_last_s = None if keep_last is None else seconds_of(keep_last)
+    config = parse_config(SceneTakesConfig, {**values, "keep_last_s": keep_last_s}, "record scene")
+    summary = record_takes(config, folder, resume)
+    with _last_words(summary.ending):
+        if json_output:
+            emit(session_document(summary))
+        else:
+            print_session(summary)
+
+
+def seconds_of(text: str) -> float:
+    """The seconds in ``30s``, ``2min`` or ``30``. Raises UsageError for anything else."""
+    found = re.fullmatch(r"(\d+(?:\.\d+)?)\s*(s|min)?", text.strip())
+    seconds = float(found[1]) * (60 if found[2] == "min" else 1) if found else 0.0
+    if seconds <= 0:
+        raise UsageError(f"--keep-last {text}: no length of time; write it as 30s or 2min")
+    return seconds
+
+
+@contextmanager
+def _last_words(ending: "Ending") -> Iterator[None]:
+    """Print in the block; then exit with 128 + n where a signal other than Ctrl-C ended it, with 1 for a full disk.
+
+    A terminal that has hung up is not written to.
+    """
+    code = {"terminated": 128 + signal.SIGTERM, "hangup": 128 + signal.SIGHUP, "disk": 1}.get(ending, 0)
+    try:
+        yield
+        sys.stdout.flush()
+    except OSError:
+        if code != 128 + signal.SIGHUP:
+            raise
+    if code:
+        raise typer.Exit(code)
 
 
 def _document(out: Path, summary: "RecordingSummary") -> dict[str, object]:
@@ -79,6 +159,7 @@ def _document(out: Path, summary: "RecordingSummary") -> dict[str, object]:
         "interrupted": summary.interrupted,
         "frames": dict(summary.frames),
         "dropped": dict(summary.dropped),
+        "missing": dict(summary.missing),
         "missed_deadlines": summary.missed_deadlines,
         "decisions": summary.decisions,
         "forced_decisions": summary.forced,
@@ -89,15 +170,19 @@ def _document(out: Path, summary: "RecordingSummary") -> dict[str, object]:
 def _print(out: Path, summary: "RecordingSummary") -> None:
     from rich.table import Table
 
-    table = Table("topic", "messages", "per second", "dropped")
+    table = Table("topic", "messages", "per second", "dropped", "missing")
     for topic, count in summary.frames.items():
         rate = f"{count / summary.seconds:.1f}" if summary.seconds > 0 else ""
-        table.add_row(topic, str(count), rate, str(summary.dropped.get(topic, "")))
+        lost = (str(summary.dropped.get(topic, "")), str(summary.missing.get(topic, "")))
+        table.add_row(topic, str(count), rate, *lost)
     console.print(table)
     ending = {
         "time": "",
         "source": "; the scenario ended",
         "interrupted": "; you stopped it, the file is whole",
+        "terminated": "; SIGTERM stopped it, the file is whole",
+        "hangup": "; its terminal hung up, the file is whole",
+        "disk": "; its disk is nearly full: it was ended while there was room for a whole file",
     }.get(summary.ending, "")
     late = f", {summary.missed_deadlines} deadlines missed" if summary.missed_deadlines else ""
     console.print(

@@ -1,12 +1,13 @@
 """The progress of a recording on stderr: time, messages a second by topic, size, what was lost."""
 
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 
 from sdt_tools.cli.console import console
-from sdt_tools.recording.live.loop import RecordingProgress
+from sdt_tools.recording.live.disk import WARNING_S
+from sdt_tools.recording.live.outcome import RecordingProgress
 from sdt_tools.recording.messages.topics import CAMERA_IMAGE, LIDAR_SCAN
 
 _SHOWN = {LIDAR_SCAN: "scans", CAMERA_IMAGE: "images"}
@@ -23,15 +24,34 @@ def recording_progress(what: str) -> Iterator[Callable[[RecordingProgress], None
         TextColumn("eta"),
         TimeRemainingColumn(),
     )
-    with Progress(*columns, console=console, transient=True, disable=not console.is_terminal) as bar:
-        task = bar.add_task(what, total=None, state="")
+    bar = Progress(*columns, console=console, transient=True, disable=not console.is_terminal)
+    task = bar.add_task(what, total=None, state="")
+    bar.start()
+    try:
         yield lambda now: bar.update(task, completed=now.recorded_s, total=now.total_s, state=describe(now))
+    finally:
+        with suppress(OSError):  # a terminal that has hung up
+            bar.stop()
 
 
 def describe(now: RecordingProgress) -> str:
-    """One line, as in ``12.4 s, 1900 scans/s, 3.1 MB``; rates are those of the wall clock."""
+    """One line, as in ``12.4 s, 1900 scans/s, 3.1 MB, disk 3.2 h``; rates are those of the wall clock."""
     wall_s = max(now.wall_s, 1e-9)
     rates = [f"{now.counts[topic] / wall_s:.0f} {word}/s" for topic, word in _SHOWN.items() if topic in now.counts]
+    state = [now.state] if now.state else []
     lost = [f"{now.dropped} dropped"] if now.dropped else []
+    missing = [f"{now.missing} missing"] if now.missing else []
     late = [f"{now.missed_deadlines} late"] if now.missed_deadlines else []
-    return ", ".join([f"{now.recorded_s:.1f} s", *rates, f"{now.size_bytes / 1e6:.1f} MB", *lost, *late])
+    size = [f"{now.recorded_s:.1f} s", *rates, f"{now.size_bytes / 1e6:.1f} MB"]
+    return ", ".join([*state, *size, *lost, *missing, *late, *_disk(now.disk_left_s)])
+
+
+def _disk(left_s: float | None) -> list[str]:
+    """How long the disk lasts; loud where that is not long."""
+    if left_s is None:
+        return []
+    if left_s >= 24 * 3600:
+        return ["disk > 1 day"]
+    if left_s < WARNING_S:
+        return [f"DISK FULL IN {left_s / 60:.1f} min"]
+    return [f"disk {left_s / 3600:.1f} h" if left_s >= 3600 else f"disk {left_s / 60:.0f} min"]

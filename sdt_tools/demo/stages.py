@@ -41,7 +41,7 @@ def record_stage(out: Path, configs: Sequence[SceneRecordingConfig]) -> None:
     for config in configs:
         summary = record_scene(config, out / f"{config.scenario}_{config.seed:04d}.mcap", _expert_driver)
         frames += summary.frames.get(LIDAR_SCAN, 0)
-        dropped += sum(summary.dropped.values())
+        dropped += summary.lost_frames
     _note(out, {"frames": frames, "dropped": dropped})
 
 

@@ -99,6 +99,11 @@ class RecordingWriter:
         """Bytes in the file so far."""
         return self._file.size
 
+    @property
+    def owed_bytes(self) -> int:
+        """Bytes that the end of the file needs, and what waits in memory: about, and rather too many."""
+        return self._file.end_bytes + self._file.pending
+
     def write(self, received: Received) -> None:
         """Take one message; it reaches the file with its chunk."""
         message = received.message

@@ -1,6 +1,11 @@
 """After the table of times: what each benchmark says beside them, the ratios to its peers above all."""
 
+import sys
+from pathlib import Path
+
 import pytest
+
+sys.path.append(str(Path(__file__).parents[1] / "unit" / "recording"))  # recorders that are killed
 
 
 @pytest.hookimpl(trylast=True)

@@ -6,6 +6,7 @@ import signal
 import subprocess
 import sys
 import time
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -18,7 +19,7 @@ from sdt_tools.models.card import ModelCard
 from sdt_tools.models.checkpoint import load_checkpoint, save_checkpoint
 from sdt_tools.models.follow_net import FollowNet, FollowNetConfig, new_follow_net
 from sdt_tools.models.preprocess import PreprocessConfig
-from sdt_tools.recording.live.loop import RecordingProgress
+from sdt_tools.recording.live.outcome import RecordingProgress
 from sdt_tools.recording.reader import Recording
 
 SHORT = ["record", "scene", "--scenario", "plain", "--seed", "7", "--no-camera"]
@@ -100,6 +101,12 @@ def test_progress_is_one_line_with_rates_and_losses() -> None:
     counts = {"/lidar/scan": 300, "/camera/image": 180, "/tf": 1}
     now = RecordingProgress(6.0, 60.0, 2.0, counts, 9_400_000, dropped=3, missed_deadlines=0)
     assert describe(now) == "6.0 s, 150 scans/s, 90 images/s, 9.4 MB, 3 dropped"
+
+
+def test_progress_tells_of_pauses_of_what_is_missing_and_how_long_the_disk_lasts() -> None:
+    now = RecordingProgress(6.0, None, 6.0, {}, 9_400_000, 0, 0, missing=2, disk_left_s=7200.0, state="take_001 paused")
+    assert describe(now) == "take_001 paused, 6.0 s, 9.4 MB, 2 missing, disk 2.0 h"
+    assert describe(replace(now, disk_left_s=150.0)).endswith("DISK FULL IN 2.5 min")
 
 
 def test_ctrl_c_in_real_time_leaves_a_whole_file(tmp_path: Path) -> None:

@@ -48,6 +48,9 @@ _INDEX_HEAD: Final = struct.Struct("<BQHI")
 _CHUNK_HEAD: Final = struct.Struct("<BQQQQII")
 _FOOTER_CHECKED: Final = struct.Struct("<BQQQ")
 
+_INDEX_RECORD_BYTES: Final = 256
+"""No record of the summary but a schema is longer, names as we give them."""
+
 
 @dataclass
 class _OpenChunk:
@@ -108,6 +111,14 @@ class McapFile:
     def pending(self) -> int:
         """Bytes that wait in memory for their chunk to be finished."""
         return sum(chunk.size for chunk in self._chunks)
+
+    @property
+    def end_bytes(self) -> int:
+        """Bytes that the summary and the footer will need: about, and rather too many."""
+        schemas = sum(len(schema.data) for schema in self._schemas.values())
+        return schemas + _INDEX_RECORD_BYTES * (
+            len(self._chunk_indexes) + len(self._channels) + len(self._attachments) + len(self._metadata) + 8
+        )
 
     @property
     def counts(self) -> dict[str, int]:

@@ -22,3 +22,7 @@ class GapCounter:
         missing = round((stamp_ns - last_ns) / self._period_ns) - 1
         self.missing += missing
         return missing
+
+    def pass_over(self, stamp_ns: int) -> None:
+        """Take note of a message that is not recorded: what is missing before it is nobody's loss."""
+        self._last_ns = stamp_ns

@@ -1,37 +1,54 @@
-"""Ctrl-C as a wish to stop, heard between two ticks instead of in the middle of a write."""
+"""Ctrl-C, SIGTERM and a terminal that hangs up: heard between two ticks instead of in the middle of a write."""
 
 import signal
 import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
 from types import FrameType
+from typing import Final
+
+_POLITE: Final = (signal.SIGTERM, signal.SIGHUP)
 
 
 class Interrupt:
-    """Whether the user wants to stop."""
+    """Whether somebody wants the recording to end, and by which signal."""
 
-    requested = False
+    def __init__(self) -> None:
+        self.signal: int | None = None
+
+    @property
+    def requested(self) -> bool:
+        """Whether it was asked for."""
+        return self.signal is not None
 
 
 @contextmanager
 def deferred_interrupt() -> Iterator[Interrupt]:
-    """Within the block the first Ctrl-C only sets ``requested``; a second one raises KeyboardInterrupt as ever.
+    """Within the block SIGINT, SIGTERM and SIGHUP only set ``signal``, to the first that came.
 
-    Signals reach the main thread only: in another one nothing is changed.
+    A second Ctrl-C raises KeyboardInterrupt as ever; further SIGTERM and SIGHUP change nothing, for a terminal that
+    closes sends several. SIGHUP stays ignored where it was (``nohup``). Signals reach the main thread only: in another
+    one nothing is changed.
     """
     interrupt = Interrupt()
     if threading.current_thread() is not threading.main_thread():
         yield interrupt
         return
 
-    before = signal.getsignal(signal.SIGINT) or signal.default_int_handler
+    before = {signal.SIGINT: signal.getsignal(signal.SIGINT) or signal.default_int_handler}
+    for number in _POLITE:
+        before[number] = signal.getsignal(number) or signal.SIG_DFL
 
-    def heard(_signal: int, _frame: FrameType | None) -> None:
-        interrupt.requested = True
-        signal.signal(signal.SIGINT, before)
+    def heard(number: int, _frame: FrameType | None) -> None:
+        interrupt.signal = interrupt.signal or number
+        if number == signal.SIGINT:
+            signal.signal(signal.SIGINT, before[signal.SIGINT])
 
-    signal.signal(signal.SIGINT, heard)
+    for number, handler in before.items():
+        if number != signal.SIGHUP or handler is not signal.SIG_IGN:
+            signal.signal(number, heard)
     try:
         yield interrupt
     finally:
-        signal.signal(signal.SIGINT, before)
+        for number, handler in before.items():
+            signal.signal(number, handler)

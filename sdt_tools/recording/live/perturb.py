@@ -50,3 +50,8 @@ class Perturbation:
         self._forced = MotionClass(int(self._rng.choice(len(weights), p=weights / weights.sum())))
         lasting_s = self._rng.uniform(config.shortest_s, config.longest_s)
         self._left = max(1, round(lasting_s * self._decision_hz))
+
+
+def perturbation_of(config: PerturbConfig | None, seed: int, decision_hz: float) -> Perturbation | None:
+    """What forces motions, where that is wanted."""
+    return None if config is None else Perturbation(seed, config, decision_hz)

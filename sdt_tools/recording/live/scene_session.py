@@ -9,8 +9,10 @@ from pydantic import Field
 from sdt_tools.clock import FAST_EPOCH_NS, HostClock
 from sdt_tools.config import Config, dump_config
 from sdt_tools.protocols import Driver, Observer
-from sdt_tools.recording.live.loop import RecordingProgress, RecordingSummary, record
-from sdt_tools.recording.live.perturb import Perturbation, PerturbConfig
+from sdt_tools.recording.live.interrupt import Interrupt, deferred_interrupt
+from sdt_tools.recording.live.outcome import RecordingProgress, RecordingSummary
+from sdt_tools.recording.live.perturb import PerturbConfig, perturbation_of
+from sdt_tools.recording.live.record import record
 from sdt_tools.recording.session import random_id
 from sdt_tools.recording.writer import RecordingWriter
 from sdt_tools.scene.config import SceneConfig
@@ -45,18 +47,30 @@ def record_scene(
 ) -> RecordingSummary:
     """Record the scene to ``out``; ``make_driver`` builds the driver of that name for the scene.
 
-    Raises ConfigError for an unknown scenario, OutputExistsError, RecordingError where the disk refuses, and what
-    ``make_driver`` raises.
+    Signals are heard until the file is closed. Raises ConfigError for an unknown scenario, OutputExistsError,
+    RecordingError where the disk refuses, and what ``make_driver`` raises.
     """
+    with deferred_interrupt() as interrupt:
+        return _record_scene(config, out, make_driver, observers, progress, interrupt)
+
+
+def _record_scene(
+    config: SceneRecordingConfig,
+    out: Path,
+    make_driver: Callable[[str, SceneSource], Driver],
+    observers: Sequence[Observer],
+    progress: Callable[[RecordingProgress], None] | None,
+    interrupt: Interrupt,
+) -> RecordingSummary:
     clock = HostClock()
     layout = layout_for(config.scenario, config.seed)
     if config.realtime:
-        _warm_up(layout, config)
+        warm_up(layout, config)
     start_ns = clock.now_ns() if config.realtime else FAST_EPOCH_NS
     source = SceneSource(layout, config.scene, config.camera, start_ns)
     driver = make_driver(config.driver, source)
     rates = config.scene.rates
-    perturb = Perturbation(config.seed, config.perturb, rates.follow_hz) if config.perturb is not None else None
+    perturb = perturbation_of(config.perturb, config.seed, rates.follow_hz)
     with RecordingWriter(
         out,
         source.info,
@@ -80,11 +94,12 @@ def record_scene(
             clock,
             perturb,
             progress,
+            interrupt=interrupt,
         )
     return replace(summary, size_bytes=writer.size)
 
 
-def _warm_up(layout: Layout, config: SceneRecordingConfig) -> None:
+def warm_up(layout: Layout, config: SceneRecordingConfig) -> None:
     """Import and compile what the scene needs, so that it can keep the pace from its first second on."""
     scene = SceneSource(layout, config.scene, config.camera)
     for _ in scene.read(scene.start_ns):

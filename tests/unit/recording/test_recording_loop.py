@@ -1,132 +1,21 @@
 import signal
 from collections import Counter
-from collections.abc import Iterator
-from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
 import pytest
-from recording_samples import CONFIG, INFO, PERIOD_NS, T0, image, scan
+from recording_rig import HandClock, Rig, TapeSource, rig
+from recording_samples import PERIOD_NS, T0, image, scan
 
-from sdt_tools.clock import SECOND_NS, HostClock
-from sdt_tools.config import MotionConfig, RateConfig
+from sdt_tools.clock import SECOND_NS
+from sdt_tools.config import MotionConfig
 from sdt_tools.errors import RecordingError, RunError
-from sdt_tools.frames import LogEntry, MotionClass, MotionCommand, Received, Twist
-from sdt_tools.protocols import Observation, SourceInfo
+from sdt_tools.frames import MotionClass, MotionCommand, Received, Twist
+from sdt_tools.protocols import Observation
 from sdt_tools.recording.live.gaps import GapCounter
-from sdt_tools.recording.live.loop import Ending, RecordingProgress, RecordingSummary, record
+from sdt_tools.recording.live.outcome import Ending, RecordingProgress
 from sdt_tools.recording.live.perturb import Perturbation, PerturbConfig
-from sdt_tools.recording.reader import Recording
 from sdt_tools.recording.writer import RecordingWriter
-
-
-@dataclass
-class TapeSource:
-    """Plays messages; something may happen when one of them is read."""
-
-    messages: list[Received]
-    happens: dict[int, BaseException | int] = field(default_factory=dict)
-    """At the message of this number: an exception is raised, or a signal arrives."""
-    info: SourceInfo = INFO
-    start_ns: int = T0
-    closed: int = 0
-    _next: int = 0
-
-    @property
-    def finished(self) -> bool:
-        return self._next >= len(self.messages)
-
-    def read(self, until_ns: int) -> Iterator[Received]:
-        while not self.finished and self.messages[self._next].received_ns <= until_ns:
-            event = self.happens.get(self._next)
-            if isinstance(event, BaseException):
-                raise event
-            if event is not None:
-                signal.raise_signal(event)  # one that is sent may come late, and two as one
-            self._next += 1
-            yield self.messages[self._next - 1]
-
-    def close(self) -> None:
-        self.closed += 1
-
-
-@dataclass
-class Wheels:
-    twists: list[Twist] = field(default_factory=list)
-
-    def command(self, twist: Twist) -> None:
-        self.twists.append(twist)
-
-
-@dataclass
-class Forward:
-    name: str = "constant:forward"
-    seen: list[Observation] = field(default_factory=list)
-
-    def decide(self, observation: Observation) -> MotionClass:
-        self.seen.append(observation)
-        return MotionClass.FORWARD
-
-
-class Advisor:
-    def advise(self) -> MotionClass:
-        return MotionClass.BACKWARD
-
-
-@dataclass
-class Watcher:
-    seen: list[Received] = field(default_factory=list)
-    closed: int = 0
-
-    def observe(self, received: Received) -> None:
-        self.seen.append(received)
-
-    def close(self) -> None:
-        self.closed += 1
-
-
-@dataclass
-class Rig:
-    """All that a recording needs, with a path to read it from."""
-
-    path: Path
-    source: TapeSource
-    wheels: Wheels = field(default_factory=Wheels)
-    driver: Forward = field(default_factory=Forward)
-    watcher: Watcher = field(default_factory=Watcher)
-
-    def run(self, seconds: float | None = None, **options: object) -> RecordingSummary:
-        with RecordingWriter(self.path, INFO, CONFIG) as writer:
-            return record(
-                self.source,
-                self.wheels,
-                self.driver,
-                Advisor(),
-                writer,
-                [self.watcher],
-                RateConfig(),
-                MotionConfig(),
-                seconds,
-                **options,  # type: ignore[arg-type]
-            )
-
-    def read(self) -> list[Received]:
-        with Recording.open(self.path) as recording:
-            assert not recording.truncated
-            return list(recording.messages())
-
-    def log(self) -> list[str]:
-        return [m.message.text for m in self.read() if isinstance(m.message, LogEntry)]
-
-    def stats(self) -> dict[str, str]:
-        with Recording.open(self.path) as recording:
-            return dict(recording.stats)
-
-
-def rig(tmp_path: Path, scans: int = 100, **source: object) -> Rig:
-    messages = sorted((m for n in range(scans) for m in (scan(n), image(n, 100))), key=lambda m: m.received_ns)
-    messages = [m for m in messages if m.received_ns < T0 + scans * PERIOD_NS]
-    return Rig(tmp_path / "r.mcap", TapeSource(messages, **source))  # type: ignore[arg-type]
 
 
 def test_everything_that_the_source_says_is_recorded(tmp_path: Path) -> None:
@@ -255,8 +144,9 @@ def test_missing_scans_are_counted_and_logged(tmp_path: Path) -> None:
         m for m in setup.source.messages if not T0 + 200_000_000 <= m.received_ns < T0 + 300_000_000
     ]
     summary = setup.run(seconds=1.0)
-    assert dict(summary.dropped) == {"/lidar/scan": 5, "/camera/image": 3}
-    assert setup.stats()["dropped./lidar/scan"] == "5"
+    assert dict(summary.missing) == {"/lidar/scan": 5, "/camera/image": 3}
+    assert dict(summary.dropped) == {"/lidar/scan": 0, "/camera/image": 0}
+    assert (setup.stats()["missing./lidar/scan"], setup.stats()["dropped./lidar/scan"]) == ("5", "0")
     assert sorted(text.split(" before ")[0] for text in setup.log()) == [
         "/camera/image: 3 messages missing",
         "/lidar/scan: 5 messages missing",
@@ -270,17 +160,6 @@ def test_missing_scans_are_counted_and_logged(tmp_path: Path) -> None:
 def test_gaps_are_counted_by_the_sensors_stamps(stamps: list[int], missing: int) -> None:
     gaps = GapCounter(10.0)
     assert sum(gaps.see(stamp) for stamp in stamps) == gaps.missing == missing
-
-
-class HandClock(HostClock):
-    """Host time that moves only when somebody sleeps."""
-
-    def __init__(self) -> None:
-        self.time_ns = T0
-        super().__init__(wall_ns=lambda: T0, monotonic_ns=lambda: self.time_ns)
-
-    def sleep(self, seconds: float) -> None:
-        self.time_ns += max(1, round(seconds * SECOND_NS))
 
 
 def test_in_real_time_the_source_is_read_at_the_pace_of_the_clock(tmp_path: Path) -> None:

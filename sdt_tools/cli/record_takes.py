@@ -1,0 +1,89 @@
+"""Takes under single keys, and what is printed of a session."""
+
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Final
+
+from sdt_tools.cli.console import console
+
+if TYPE_CHECKING:
+    from sdt_tools.recording.live.control import Control
+    from sdt_tools.recording.live.scene_takes import SceneTakesConfig, SessionSummary
+
+_WISHES: Final = {
+    " ": "toggle",
+    "n": "next",
+    "k": "stop",
+    "x": "discard",
+    "m": "mark",
+    "s": "save",
+    "q": "quit",
+}
+_KEYS: Final = "space pause, n next take, k keep and stop, x discard, m mark, s save the last seconds, q quit"
+
+
+def record_takes(config: "SceneTakesConfig", folder: Path, resume: bool) -> "SessionSummary":
+    """Record a session into ``folder``, with keys where somebody is there to press them.
+
+    Raises what ``record_scene_takes`` raises; a changed config is shown line by line first.
+    """
+    from sdt_tools.cli.drivers import make_driver
+    from sdt_tools.cli.recording_progress import recording_progress
+    from sdt_tools.recording.live.scene_takes import record_scene_takes
+    from sdt_tools.recording.live.session_folder import ChangedConfigError
+
+    try:
+        with _control() as control, recording_progress(f"session {folder.name}") as progress:
+            return record_scene_takes(config, folder, make_driver, resume, control, progress=progress)
+    except ChangedConfigError as error:
+        for line in error.differences:
+            console.print(line, markup=False, highlight=False)
+        raise
+
+
+@contextmanager
+def _control() -> Iterator["Control | None"]:
+    from sdt_tools.cli.keys import at_a_terminal, pressed_keys
+    from sdt_tools.recording.live.control import Control, Wish
+
+    if not at_a_terminal():
+        yield None
+        return
+    control = Control()
+
+    def heard(key: str) -> None:
+        wish = _WISHES.get(key.lower())
+        if wish is not None:
+            control.want(Wish(wish))
+
+    console.print(_KEYS)
+    with pressed_keys(heard, sys.stdin.fileno()):
+        yield control
+
+
+def session_document(summary: "SessionSummary") -> dict[str, object]:
+    """The session for machines."""
+    return {
+        "session": str(summary.folder),
+        "id": summary.record.id,
+        "ending": summary.ending,
+        "takes": [take.model_dump() for take in summary.record.takes],
+        "cut_off": [str(path) for path in summary.cut_off],
+    }
+
+
+def print_session(summary: "SessionSummary") -> None:
+    """The session for people."""
+    from rich.markup import escape
+    from rich.table import Column, Table
+
+    table = Table(Column("take", no_wrap=True), "seconds", "messages", "dropped", "missing", "ended by", "")
+    for take in summary.record.takes:
+        remark = "discarded" if take.trash else escape(take.trigger)
+        numbers = (f"{take.seconds:.1f}", str(take.messages), str(take.dropped), str(take.missing))
+        table.add_row(take.name, *numbers, take.ending or "cut off", remark)
+    console.print(table)
+    for path in summary.cut_off:
+        console.print(f"{path} was cut off; `sdt repair` makes a whole file of it", markup=False)

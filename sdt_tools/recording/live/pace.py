@@ -1,0 +1,62 @@
+"""When the loop's ticks come."""
+
+from collections.abc import Callable
+from time import sleep
+from typing import Protocol, runtime_checkable
+
+from sdt_tools.clock import SECOND_NS, HostClock, Pacer
+
+
+@runtime_checkable
+class Pace(Protocol):
+    """Releases the loop once a tick."""
+
+    @property
+    def missed(self) -> int:
+        """Ticks that came too late."""
+        ...
+
+    def next_ns(self) -> int:
+        """Wait for the next tick; the stamp up to which the source is to be read."""
+        ...
+
+
+class FastPace:
+    """Ticks as fast as they are asked for, one scan period apart."""
+
+    missed = 0
+
+    def __init__(self, start_ns: int, scan_hz: float) -> None:
+        self._start_ns = start_ns
+        self._period_ns = SECOND_NS / scan_hz
+        self._tick = -1
+
+    def next_ns(self) -> int:
+        """The stamp up to which the source is read next."""
+        self._tick += 1
+        return self._start_ns + round(self._tick * self._period_ns)
+
+
+class RealPace:
+    """Ticks when their time has come. What a late tick missed is read with it."""
+
+    def __init__(self, clock: HostClock, scan_hz: float, sleep_s: Callable[[float], None]) -> None:
+        self._clock = clock
+        self._pacer = Pacer(round(SECOND_NS / scan_hz), clock, sleep_s)
+
+    @property
+    def missed(self) -> int:
+        """Ticks that came too late."""
+        return self._pacer.missed
+
+    def next_ns(self) -> int:
+        """Wait for the next tick; the host's time then."""
+        self._pacer.wait()
+        return self._clock.now_ns()
+
+
+def paced(
+    start_ns: int, scan_hz: float, clock: HostClock | None, sleep_s: Callable[[float], None] = sleep
+) -> FastPace | RealPace:
+    """A tick a scan, at the pace of ``clock``; without one, as fast as it can."""
+    return FastPace(start_ns, scan_hz) if clock is None else RealPace(clock, scan_hz, sleep_s)

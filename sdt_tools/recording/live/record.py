@@ -1,0 +1,124 @@
+"""One recording of one source."""
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import replace
+from time import sleep
+
+from sdt_tools.clock import HostClock
+from sdt_tools.config import MotionConfig, RateConfig
+from sdt_tools.errors import RunError
+from sdt_tools.frames import LogEntry, Received
+from sdt_tools.protocols import Actuator, Driver, Expert, Observer, Source
+from sdt_tools.recording.live.decide import Deciders, DecisionLoop, Perturb
+from sdt_tools.recording.live.disk import DiskWatch
+from sdt_tools.recording.live.interrupt import Interrupt, deferred_interrupt
+from sdt_tools.recording.live.loop import LiveLoop
+from sdt_tools.recording.live.outcome import Ending, RecordingProgress, RecordingSummary
+from sdt_tools.recording.live.pace import paced
+from sdt_tools.recording.live.pressure import QueueLimits
+from sdt_tools.recording.live.sink import DirectSink, QueuedSink
+from sdt_tools.recording.live.take import Take, Tally, stats_of
+from sdt_tools.recording.writer import RecordingWriter
+
+
+def record(
+    source: Source,
+    actuator: Actuator,
+    driver: Driver,
+    expert: Expert | None,
+    writer: RecordingWriter,
+    observers: Sequence[Observer],
+    rates: RateConfig,
+    motions: MotionConfig,
+    seconds: float | None,
+    realtime: bool = False,
+    clock: HostClock | None = None,
+    perturb: Perturb | None = None,
+    progress: Callable[[RecordingProgress], None] | None = None,
+    sleep_s: Callable[[float], None] = sleep,
+    interrupt: Interrupt | None = None,
+    limits: QueueLimits | None = None,
+    disk: DiskWatch | None = None,
+) -> RecordingSummary:
+    """Record ``source`` for ``seconds`` (without, until it ends) while ``driver`` moves ``actuator``.
+
+    The source is read in ticks of one scan period; with ``realtime`` ticks keep the pace of ``clock``, the host's
+    unless another is given, and a thread of its own writes: what it cannot keep up with is dropped as ``pressure``
+    says, and the recording ends before the ``disk`` is full. Ctrl-C, SIGTERM and SIGHUP end the recording as if its
+    time were up, and the summary says so; ``interrupt`` is what hears them, where the caller listens already. On every
+    way out the robot is told to stand still, and source and observers are closed; the writer is the caller's to close.
+
+    Raises RunError where the source fails, after a word in ``/session/log``; RecordingError where the disk refuses.
+    """
+    decisions = DecisionLoop(Deciders(driver, expert, perturb), motions, rates.follow_hz, source.start_ns)
+    pace = paced(source.start_ns, rates.scan_hz, (clock or HostClock()) if realtime else None, sleep_s)
+    sink = QueuedSink(writer, limits, disk) if realtime else DirectSink(writer)
+
+    def tally() -> Tally:
+        return Tally(decisions.decisions, decisions.forced, pace.missed + decisions.missed)
+
+    recorder = _OneTake(Take(sink, source.start_ns, seconds, rates, tally), writer)
+    loop = LiveLoop(source, actuator, decisions, pace, observers, recorder, progress)
+    try:
+        if interrupt is not None:
+            loop.run(interrupt)
+        else:
+            with deferred_interrupt() as own:
+                loop.run(own)
+    except RunError as error:
+        raise RunError(f"{writer.path}: {error}") from error.__cause__
+    finally:
+        loop.close()
+    assert recorder.summary is not None
+    return replace(recorder.summary, size_bytes=writer.size)
+
+
+class _OneTake:
+    """Records until the take's time is up."""
+
+    def __init__(self, take: Take, writer: RecordingWriter) -> None:
+        self.ending: Ending | None = None
+        self.summary: RecordingSummary | None = None
+        self._take = take
+        self._writer = writer
+
+    @property
+    def end_ns(self) -> int | None:
+        """When the take's time is up."""
+        return self._take.end_ns
+
+    def write(self, received: Received) -> None:
+        """Into the take."""
+        self._take.write(received)
+
+    def missing(self, received: Received) -> int:
+        """From the take."""
+        return self._take.missing(received)
+
+    def tick(self, now_ns: int) -> Iterator[LogEntry]:
+        """Watch the writer and the disk."""
+        yield from self._take.watch(now_ns)
+        if self._take.space is not None and self._take.space.full:
+            self.ending = Ending.DISK
+
+    def time_up(self, now_ns: int) -> list[LogEntry]:
+        """Enough."""
+        del now_ns
+        self.ending = Ending.TIME
+        return []
+
+    def last_words(self, now_ns: int) -> list[LogEntry]:
+        """Drops that are not told yet."""
+        return self._take.sink.bursts(now_ns, at_end=True)
+
+    def end(self, ending: Ending, now_ns: int) -> None:
+        """Note what came of it. Raises what the writer met while the last messages were written."""
+        self._take.stop(now_ns)
+        self.summary = self._take.finish(ending)
+        self._writer.note(stats_of(self.summary))
+        if self._take.sink.failure is not None and ending is not Ending.FAILED:
+            raise self._take.sink.failure
+
+    def progress(self, now_ns: int) -> RecordingProgress:
+        """Where the take stands."""
+        return self._take.progress(now_ns)
