@@ -43,7 +43,7 @@ class _Walk:
         self._message_indexes: dict[int, int] = {}
         self._loose = _LooseMessages(view)
         self._last_ns = 0
-        self._taken_since_gap = True
+        self._gap_is_open = False
         self._walk()
         self._settle()
         self.index.segments += self._loose.segments()
@@ -60,9 +60,11 @@ class _Walk:
                 if found is None:
                     self._cut(opcode, body)
                     break
-                self._skip(found)
+                self._skip()
                 before = at = found
                 continue
+            if opcode not in (Opcode.CHUNK, Opcode.MESSAGE) and self._is_chunk_by_another_name(body, length):
+                opcode = Opcode.CHUNK
             if opcode != Opcode.MESSAGE_INDEX:
                 self._settle()
             if opcode == Opcode.FOOTER:
@@ -87,6 +89,19 @@ class _Walk:
             return tail == MAGIC or (end + len(MAGIC) > len(self._view) and MAGIC.startswith(tail))
         return opcode != Opcode.CHUNK or chunk_fits(self._view, body, length)
 
+    def _is_chunk_by_another_name(self, body: int, length: int) -> bool:
+        """Whether all but the kind of a record says that it is a chunk: its lengths, and a message index behind it."""
+        end = body + length
+        if end + HEAD.size > len(self._view) or self._view[end] != Opcode.MESSAGE_INDEX:
+            return False
+        _, index_length = HEAD.unpack_from(self._view, end)
+        index_body = end + HEAD.size
+        return (
+            adds_up(self._view, Opcode.CHUNK, body, length)
+            and index_body + index_length <= len(self._view)
+            and adds_up(self._view, Opcode.MESSAGE_INDEX, index_body, index_length)
+        )
+
     def _is_vouched(self, before: int, at: int) -> bool:
         """Whether the record before ``at`` is whole beyond doubt; else its length may be what is damaged."""
         if before == at:
@@ -97,21 +112,23 @@ class _Walk:
     def _take(self, opcode: int, body: int, length: int) -> None:
         if opcode == Opcode.CHUNK:
             self._chunk = _chunk_at(self._view, body, length)
+            self._end_gap(self._chunk.start_ns)
             self._last_ns = self._chunk.end_ns
-            self._taken_since_gap = True
         elif opcode == Opcode.MESSAGE_INDEX and length >= 6:
             channel_id = int.from_bytes(self._view[body : body + 2], "little")
             self._message_indexes[channel_id] = body - HEAD.size
         elif opcode == Opcode.MESSAGE and length >= _MESSAGE_FIXED:
             self._last_ns = self._loose.add(body, length)
-            self._taken_since_gap = True
+            self._end_gap(self._last_ns)
         else:
             take_record(self._view, self.index, opcode, body, length)
 
     def _settle(self) -> None:
-        """The chunk before is whole, with all its message indexes."""
+        """The chunk before is whole, with all its message indexes; indexes without a chunk tell what is lost."""
         if self._chunk is not None:
             self.index.segments.append(_settled(self._view, self.index, self._chunk, self._message_indexes))
+        elif (times := _indexed_times(self._view, self._message_indexes)) is not None:
+            self._note_gap(*times)
         self._chunk, self._message_indexes = None, {}
 
     def _cut(self, opcode: int, body: int) -> None:
@@ -120,20 +137,24 @@ class _Walk:
         if opcode == Opcode.CHUNK and body + _TIMES.size <= len(self._view):
             self._chunk = _chunk_at(self._view, body, len(self._view) - body, cut=True)
 
-    def _skip(self, found: int) -> None:
-        """Note that nothing could be read up to ``found``."""
+    def _skip(self) -> None:
+        """Note that some bytes are no records: what they held lay between the message before and the one behind."""
         self._settle()
-        opcode, _ = HEAD.unpack_from(self._view, found)
-        times_at = found + HEAD.size + (6 if opcode == Opcode.MESSAGE else 0)
-        next_ns = self._last_ns
-        if opcode in (Opcode.CHUNK, Opcode.MESSAGE):
-            next_ns = int.from_bytes(self._view[times_at : times_at + 8], "little")
-        first_ns = min(self._last_ns or next_ns, next_ns)
+        self._note_gap(self._last_ns, self._last_ns)
+        self._gap_is_open = True
+
+    def _note_gap(self, start_ns: int, end_ns: int) -> None:
         gaps = self.index.gaps
-        if gaps and not self._taken_since_gap:  # still the same one: nothing was read in between
-            first_ns, next_ns = min(first_ns, gaps[-1].start_ns), max(next_ns, gaps.pop().end_ns)
-        gaps.append(Gap(first_ns, next_ns, "records between these times are unreadable"))
-        self._taken_since_gap = False
+        if gaps and self._gap_is_open:  # still the same one: nothing was read in between
+            last = gaps.pop()
+            start_ns, end_ns = min(last.start_ns or start_ns, start_ns or last.start_ns), max(last.end_ns, end_ns)
+        gaps.append(Gap(start_ns, end_ns, "records between these times are unreadable"))
+
+    def _end_gap(self, next_ns: int) -> None:
+        """A message was read again."""
+        if self._gap_is_open:
+            self._note_gap(next_ns, next_ns)
+        self._gap_is_open = False
 
     def _next_record(self, start: int) -> int | None:
         """Where from ``start`` on records go on: the first of some that follow each other."""

@@ -88,6 +88,8 @@ def test_every_layout_of_the_packages_writer(tmp_path: Path, shuffled: bool, mes
     if shuffled:
         np.random.default_rng(0).shuffle(order)
     for number, (compression, chunk_size, indexes, summary) in enumerate(LAYOUTS):
+        if messages < 60 and number % 7:
+            continue  # there is little to lay out
         path = tmp_path / f"{number}.mcap"
         with path.open("wb") as file:
             repeat = summary in ("all", "no statistics")
@@ -259,8 +261,7 @@ def test_chunks_that_lie_in_each_other_come_in_order(tmp_path: Path) -> None:
     assert len(times) == 3 * len(spans)
 
 
-@pytest.mark.parametrize("compression", ["", "lz4", "zstd"])
-@pytest.mark.parametrize("chunked", [True, False])
+@pytest.mark.parametrize(("compression", "chunked"), [("", False), ("", True), ("lz4", True), ("zstd", True)])
 def test_a_message_of_64_megabytes_beside_one_of_none(tmp_path: Path, compression: str, chunked: bool) -> None:
     huge = np.random.default_rng(0).bytes(1 << 20) * 64
     body = message(2, T0, huge) + message(2, T0 + 1, b"")
