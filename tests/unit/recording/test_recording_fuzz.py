@@ -269,7 +269,7 @@ def test_a_file_cut_at_every_byte(reader: BoundedReader, tmp_path: Path) -> None
 
 @pytest.mark.parametrize("kept", ["whole", "cut"])
 def test_a_bit_flipped_in_every_byte_costs_a_chunk_which_is_named(tmp_path: Path, kept: str) -> None:
-    """Of the messages in chunks three at most, and the account covers their times; of those outside, one.
+    """Of the messages in chunks three at most, and the account covers their times; of those outside, one or two.
 
     What stands outside chunks has no checksum: a time that is flipped there is a time.
     """
@@ -279,6 +279,7 @@ def test_a_bit_flipped_in_every_byte_costs_a_chunk_which_is_named(tmp_path: Path
     announced = len(by_hand.MAGIC + header("p", "l") + STATE)  # what a channel was, nobody knows without its summary
     path = tmp_path / "flipped.mcap"
     path.write_bytes(data)
+    at_most = 1 if kept == "whole" else 2  # before the end of a cut file two records may be a coincidence
     rng = random.Random(2)
     for place in range(8 if kept == "whole" else announced, len(data)):
         bit = rng.randrange(8)
@@ -291,4 +292,4 @@ def test_a_bit_flipped_in_every_byte_costs_a_chunk_which_is_named(tmp_path: Path
         unnamed = {ns for ns in lost if not any(d.start_ns <= ns <= d.end_ns for d in damage)}
         assert len(lost) <= 3, (place, bit)
         assert not unnamed, (place, bit, damage)
-        assert len(LOOSE - read) <= 1, (place, bit)
+        assert len(LOOSE - read) <= at_most, (place, bit)
