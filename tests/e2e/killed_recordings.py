@@ -51,21 +51,23 @@ def kill_a_recording(path: Path, seed: int) -> Killed:
         process.kill()
         process.wait()
     with McapReader(path) as reader:
-        last_ns = max(extent.last_ns or 0 for extent in reader.extents.values())
+        last_ns = max(extent.last_ns for extent in reader.extents.values() if extent.last_ns is not None)
     return Killed(path, killed_ns, last_ns)
 
 
 def _wait_for_scans(path: Path, process: "subprocess.Popen[bytes]") -> None:
-    """Until the file has grown beyond its beginning: the first scans are in it."""
+    """Until the file has grown so far that a first message is in it."""
     deadline_s = time.monotonic() + START_S
-    beginning = 0
+    looked_at = 0
     while True:
         assert process.poll() is None, "the recording ended by itself"
         assert time.monotonic() < deadline_s, "nothing was recorded"
         size = path.stat().st_size if path.exists() else 0
-        if beginning and size > beginning + 4000:
-            return
-        beginning = beginning or size
+        if size > looked_at:
+            looked_at = size
+            with McapReader(path) as reader:
+                if reader.segments():
+                    return
         time.sleep(0.005)
 
 
