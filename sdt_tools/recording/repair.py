@@ -107,4 +107,4 @@ def _lost(source: McapReader, messages: Mapping[str, int]) -> dict[str, int] | N
     promised: dict[str, int] = {}
     for number, channel in source.channels.items():
         promised[channel.topic] = promised.get(channel.topic, 0) + source.counts.get(number, 0)
-    return {topic: count - messages.get(topic, 0) for topic, count in promised.items()}
+    return {topic: max(0, count - messages.get(topic, 0)) for topic, count in promised.items()}

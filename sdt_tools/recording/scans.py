@@ -16,6 +16,7 @@ from sdt_tools.recording.scan_kernel import copy_rows, find_messages, find_range
 from sdt_tools.recording.series import ScanSeries, empty_series
 
 ROW_BYTES: Final = RAYS * 8
+_LAST_NS: Final = 2**63 - 1
 
 
 def batches_from_chunks(
@@ -28,7 +29,7 @@ def batches_from_chunks(
     batch, filled = empty_series(size), 0
     wanted = np.array(sorted(channel_ids), dtype=np.int64)
     for chunk in chunks:
-        found = _FoundScans(chunk, wanted)
+        found = _FoundScans(chunk, wanted, path)
         taken = 0
         while taken < len(found):
             rows = min(len(found) - taken, size - filled)
@@ -50,6 +51,8 @@ def batches_from_messages(messages: Iterable[Received], size: int, path: Path) -
             continue
         if scan.ranges_m.size != RAYS:
             raise _other_rays(path, scan.ranges_m.size, scan.stamp_ns)
+        if max(scan.stamp_ns, received.received_ns) > _LAST_NS:
+            raise _beyond_time(path)
         batch.stamps_ns[filled], batch.received_ns[filled] = scan.stamp_ns, received.received_ns
         batch.ranges_m[filled] = scan.ranges_m
         filled += 1
@@ -63,9 +66,11 @@ def batches_from_messages(messages: Iterable[Received], size: int, path: Path) -
 class _FoundScans:
     """The scans in one unpacked chunk, in order of receipt."""
 
-    def __init__(self, chunk: bytes | memoryview, channel_ids: Int64[np.ndarray, "channels"]) -> None:
+    def __init__(self, chunk: bytes | memoryview, channel_ids: Int64[np.ndarray, "channels"], path: Path) -> None:
         self._buffer = np.frombuffer(chunk, np.uint8)
         log_ns, publish_ns, starts, ends = find_messages(self._buffer, channel_ids)
+        if np.any(log_ns < 0) or np.any(publish_ns < 0):  # what is beyond 63 bits
+            raise _beyond_time(path)
         order = np.argsort(log_ns, kind="stable")
         self._log_ns, self._publish_ns = log_ns[order], publish_ns[order]
         self._starts, self._ends = starts[order], ends[order]
@@ -97,6 +102,12 @@ class _FoundScans:
         if ranges.size != RAYS:
             raise _other_rays(path, ranges.size, stamp_ns)
         return ranges
+
+
+def _beyond_time(path: Path) -> RecordingError:
+    return RecordingError(
+        f"{path}: a message on {LIDAR_SCAN} is stamped after the year 2262: its time is damaged; read it as messages"
+    )
 
 
 def _other_rays(path: Path, rays: int, stamp_ns: int) -> RecordingError:

@@ -11,11 +11,16 @@ import zstandard
 from mcap.opcode import Opcode
 
 MAX_CHUNK_BYTES: Final = 1 << 30
-"""A chunk that claims to be larger is taken for damaged; writers make chunks of about a megabyte."""
+"""A compressed chunk that claims to hold more is taken for damaged; writers make chunks of about a megabyte.
+
+One that is not compressed may have any size: it is read where it lies in the file.
+"""
 
 _LZ4_MOST: Final = 256
 """lz4 packs no more than 255 bytes into one."""
+_LZ4_PART: Final = 1 << 24
 _ZSTD_PART: Final = 1 << 20
+_BAD_DATA: Final = (RuntimeError, zstandard.ZstdError)
 _RECORD_HEAD: Final = struct.Struct("<BQ")
 _CHUNK_HEAD: Final = struct.Struct("<BQQQQII")
 _MESSAGE_HEAD: Final = struct.Struct("<HIQQ")
@@ -75,7 +80,7 @@ def read_segment(view: memoryview, segment: Segment) -> bytes | memoryview:
             return b""
         raise DamagedChunkError("its head is unreadable") from None
     at += name_length + 8
-    if size > MAX_CHUNK_BYTES or (compression == "lz4" and size > _LZ4_MOST * data_length):
+    if compression and (size > MAX_CHUNK_BYTES or (compression == "lz4" and size > _LZ4_MOST * data_length)):
         raise DamagedChunkError(f"it claims {size} bytes, more than it can hold")
     if at + data_length > end and not segment.cut:
         raise DamagedChunkError("its data reaches beyond it")
@@ -87,6 +92,19 @@ def read_segment(view: memoryview, segment: Segment) -> bytes | memoryview:
     if crc and zlib.crc32(data) != crc:
         raise DamagedChunkError("its checksum does not match")
     return data
+
+
+def ends_within_a_record(view: memoryview, segment: Segment, data: bytes | memoryview) -> bool:
+    """Whether the last record in ``data``, of an unpacked chunk, reaches beyond it.
+
+    Only chunks without a checksum are looked through: what a checksum covers is as it was written.
+    """
+    if segment.loose or segment.cut or _CHUNK_HEAD.unpack_from(view, segment.offset)[5]:
+        return False
+    at, size = 0, len(data)
+    while at + _RECORD_HEAD.size <= size:
+        at += _RECORD_HEAD.size + _RECORD_HEAD.unpack_from(data, at)[1]
+    return at != size
 
 
 def walk_messages(data: bytes | memoryview) -> Iterator[RawMessage]:
@@ -105,35 +123,52 @@ def walk_messages(data: bytes | memoryview) -> Iterator[RawMessage]:
 
 
 def _decompress(compression: str, data: memoryview, size: int, cut: bool) -> bytes | memoryview:
+    if compression == "":
+        return data
+    if compression not in ("lz4", "zstd"):
+        raise DamagedChunkError(f"it is compressed with {compression!r}; lz4, zstd and none are known")
+    if compression == "lz4" and not cut and size <= _LZ4_PART:
+        return _unpack_lz4_at_once(data, size)
+    parts: list[bytes] = []
     try:
-        if compression == "":
-            return data
-        if compression == "lz4":
-            return _unpack_lz4(data, size, cut)
-        if compression == "zstd":
-            return _unpack_zstd(data, size)
-    except (RuntimeError, zstandard.ZstdError) as error:
-        if cut:
-            return b""
-        raise DamagedChunkError(f"it does not decompress ({error})") from None
-    raise DamagedChunkError(f"it is compressed with {compression!r}; lz4, zstd and none are known")
-
-
-def _unpack_lz4(data: memoryview, size: int, cut: bool) -> bytes:
-    """At most ``size`` bytes out of an lz4 frame; of a cut one, its whole blocks."""
-    unpacked: bytes
-    if not cut and lz4.frame.get_frame_info(data)["content_size"] == size:
-        unpacked = lz4.frame.decompress(data)
-    else:
-        unpacked = lz4.frame.LZ4FrameDecompressor().decompress(data, max_length=max(size, 1))
-    return unpacked
-
-
-def _unpack_zstd(data: memoryview, size: int) -> bytes:
-    """At most ``size`` bytes, asked for in parts: no room is made for more than there is."""
-    with zstandard.ZstdDecompressor().stream_reader(data) as stream:
-        parts, left = [], size
-        while left and (part := stream.read(min(left, _ZSTD_PART))):
-            parts.append(part)
-            left -= len(part)
+        parts.extend((_lz4_parts if compression == "lz4" else _zstd_parts)(data, size))
+    except _BAD_DATA as error:
+        if not cut:
+            raise DamagedChunkError(f"it does not decompress ({error})") from None
     return b"".join(parts)
+
+
+def _unpack_lz4_at_once(data: memoryview, size: int) -> bytes:
+    try:
+        if lz4.frame.get_frame_info(data)["content_size"] == size:
+            unpacked: bytes = lz4.frame.decompress(data)
+            return unpacked
+        return b"".join(_lz4_parts(data, size))
+    except _BAD_DATA as error:
+        raise DamagedChunkError(f"it does not decompress ({error})") from None
+
+
+def _lz4_parts(data: memoryview, size: int) -> Iterator[bytes]:
+    """At most ``size`` bytes out of lz4 frames, in parts: no room is made for much more than there is."""
+    decompressor, left = lz4.frame.LZ4FrameDecompressor(), size
+    packed: bytes | memoryview = data
+    while left:
+        part = decompressor.decompress(packed, max_length=min(left, _LZ4_PART))
+        packed = b""
+        left -= len(part)
+        yield part
+        if decompressor.eof:
+            if not decompressor.unused_data:
+                return
+            packed, decompressor = decompressor.unused_data, lz4.frame.LZ4FrameDecompressor()
+        elif decompressor.needs_input or not part:
+            return
+
+
+def _zstd_parts(data: memoryview, size: int) -> Iterator[bytes]:
+    """The same out of zstd frames."""
+    with zstandard.ZstdDecompressor().stream_reader(data, read_across_frames=True) as stream:
+        left = size
+        while left and (part := stream.read(min(left, _ZSTD_PART))):
+            left -= len(part)
+            yield part

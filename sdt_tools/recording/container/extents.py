@@ -30,7 +30,10 @@ class Extent:
 def indexed_extents(
     view: memoryview, segments: Sequence[Segment], counts: Mapping[int, int]
 ) -> dict[int, Extent] | None:
-    """Extents of the channels by ``counts`` and the message indexes of their outermost chunks; None where one lacks."""
+    """Extents of the channels by ``counts`` and the message indexes of their outermost chunks.
+
+    None where one lacks, or does not lead to the messages that are counted.
+    """
     if any(segment.index_offsets is None for segment in segments):
         return None
     forwards = sorted(segments, key=lambda segment: segment.start_ns)
@@ -46,6 +49,8 @@ def indexed_extents(
             if extent.last_ns is not None and segment.end_ns <= extent.last_ns:
                 break
             _take_index(extent, view, segment, channel_id)
+        if count and extent.first_ns is None:
+            return None
     return extents
 
 

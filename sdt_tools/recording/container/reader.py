@@ -10,23 +10,28 @@ import mmap
 from collections.abc import Iterator, Mapping, Set
 from dataclasses import dataclass
 from functools import cached_property
-from io import BytesIO
 from itertools import pairwise
 from pathlib import Path
 from types import TracebackType
-from typing import Final, NamedTuple
+from typing import NamedTuple
 
-from mcap.data_stream import ReadDataStream
 from mcap.records import Attachment, Channel, Metadata, Schema
 
 from sdt_tools.errors import RecordingError
-from sdt_tools.recording.container.chunk import DamagedChunkError, Segment, read_segment, walk_messages
+from sdt_tools.recording.container.attachments import read_attachment
+from sdt_tools.recording.container.chunk import (
+    DamagedChunkError,
+    RawMessage,
+    Segment,
+    ends_within_a_record,
+    read_segment,
+    walk_messages,
+)
 from sdt_tools.recording.container.extents import Extent, indexed_extents
 from sdt_tools.recording.container.file import MAGIC
 from sdt_tools.recording.container.index import read_index
-from sdt_tools.recording.container.records import FileIndex
+from sdt_tools.recording.container.records import HEAD, FileIndex
 
-_RECORD_HEAD_BYTES: Final = 9
 _log = logging.getLogger(__name__)
 
 
@@ -66,7 +71,7 @@ class McapReader:
         self.path = path
         self._map = _map_file(path)
         self._view = memoryview(self._map)
-        self._damage: dict[int, Damage] = {}
+        self._damage: dict[tuple[int, str], Damage] = {}
         self._index: FileIndex = read_index(self._view)
 
     def close(self) -> None:
@@ -103,7 +108,8 @@ class McapReader:
         """Stretches met so far that could not be read, in the order of their time."""
         skipped = [Damage(gap.start_ns, gap.end_ns, gap.reason) for gap in self._index.gaps]
         if bytes(self._view[: len(MAGIC)]) != MAGIC:
-            skipped.append(Damage(0, 0, "the file's first bytes are not those of an MCAP; nothing is lost by that"))
+            skipped.append(_harmless("the file's first bytes are not those of an MCAP"))
+        skipped += map(_harmless, self._index.harmless)
         return tuple(sorted([*skipped, *self._damage.values()], key=lambda damage: damage.start_ns))
 
     @property
@@ -131,11 +137,13 @@ class McapReader:
         return "" if schema is None else schema.name
 
     def attachments(self) -> Iterator[Attachment]:
-        """The attachments in the order of the file; those that are damaged are left out."""
+        """The attachments in the order of the file; those that are damaged are left out and named in ``damage``."""
         for offset, length in self._index.attachments:
-            body = BytesIO(self._view[offset + _RECORD_HEAD_BYTES : offset + length])
-            with contextlib.suppress(Exception):  # the record class raises whatever its bytes lead it to
-                yield Attachment.read(ReadDataStream(body))
+            attachment = read_attachment(self._view[offset + HEAD.size : offset + length])
+            if attachment is None:
+                self._note(offset, "an attachment is damaged and left out", 0, 0)
+            else:
+                yield attachment
 
     @cached_property
     def extents(self) -> Mapping[int, Extent]:
@@ -147,9 +155,13 @@ class McapReader:
                 return indexed
         counted = {number: Extent() for number in self.channels}
         for segment in self.segments():
+            strangers = []
             for raw in walk_messages(self.unpacked(segment) or b""):
                 if raw.channel_id in counted:
                     counted[raw.channel_id].add(1, raw.log_ns, raw.log_ns)
+                else:
+                    strangers.append(raw)
+            self._note_strangers(segment, strangers)
         return counted
 
     def entries(
@@ -157,7 +169,7 @@ class McapReader:
     ) -> Iterator[RawEntry]:
         """Messages of some channels (of all without) logged in ``[start_ns, end_ns)``, in the order of their log time.
 
-        Messages of a channel that the file does not announce are left out.
+        Messages of a channel that the file does not announce are left out, and named in ``damage``.
         """
         wanted = frozenset(self.channels if channel_ids is None else channel_ids)
         pending: list[RawEntry] = []
@@ -187,18 +199,14 @@ class McapReader:
     def unpacked(self, segment: Segment) -> bytes | memoryview | None:
         """The records in ``segment``; None, a warning, and an entry in ``damage`` where they cannot be had."""
         try:
-            return read_segment(self._view, segment)
+            data = read_segment(self._view, segment)
         except DamagedChunkError as error:
-            if segment.offset not in self._damage:
-                self._damage[segment.offset] = Damage(segment.start_ns, segment.end_ns, str(error))
-                _log.warning(
-                    "%s: a chunk is damaged: %s; messages from %d to %d ns are lost",
-                    self.path,
-                    error,
-                    segment.start_ns,
-                    segment.end_ns,
-                )
+            self._note(segment.offset, str(error), segment.start_ns, segment.end_ns)
             return None
+        if ends_within_a_record(self._view, segment, data):
+            reason = "a record in it is longer than it is; what follows that record is lost"
+            self._note(segment.offset, reason, segment.start_ns, segment.end_ns)
+        return data
 
     def _entries(
         self, segment: Segment, wanted: frozenset[int], start_ns: int | None, end_ns: int | None
@@ -206,14 +214,36 @@ class McapReader:
         data = self.unpacked(segment)
         if data is None:
             return
+        strangers = []
         for raw in walk_messages(data):
-            if raw.channel_id in wanted and _within(raw.log_ns, start_ns, end_ns):
-                yield RawEntry(raw.log_ns, segment.offset, raw.start, raw.end, raw.publish_ns, raw.channel_id, data)
+            if raw.channel_id in wanted:
+                if _within(raw.log_ns, start_ns, end_ns):
+                    yield RawEntry(raw.log_ns, segment.offset, raw.start, raw.end, raw.publish_ns, raw.channel_id, data)
+            elif raw.channel_id not in self.channels:
+                strangers.append(raw)
+        self._note_strangers(segment, strangers)
+
+    def _note_strangers(self, segment: Segment, strangers: list[RawMessage]) -> None:
+        """Messages that belong to nothing: the announcement of their channel, or their number, is damaged."""
+        if strangers:
+            times = [raw.log_ns for raw in strangers]
+            reason = f"{len(strangers)} messages of channels that the file does not announce"
+            self._note(segment.offset, reason, min(times), max(times))
+
+    def _note(self, offset: int, reason: str, start_ns: int, end_ns: int) -> None:
+        if (offset, reason) in self._damage:
+            return
+        self._damage[offset, reason] = Damage(start_ns, end_ns, reason)
+        _log.warning("%s: damaged at byte %d: %s; times %d to %d ns", self.path, offset, reason, start_ns, end_ns)
 
 
 def overlapping(segments: list[Segment]) -> bool:
     """Whether some of these, which are in the order of their beginning, overlap in time."""
     return any(later.start_ns < earlier.end_ns for earlier, later in pairwise(segments))
+
+
+def _harmless(reason: str) -> Damage:
+    return Damage(0, 0, f"{reason}; nothing is lost by that")
 
 
 def _within(log_ns: int, start_ns: int | None, end_ns: int | None) -> bool:
@@ -227,6 +257,8 @@ def _nearly_magic(head: bytes) -> bool:
 
 def _map_file(path: Path) -> mmap.mmap:
     try:
+        if path.exists() and not path.is_file() and not path.is_dir():
+            raise RecordingError(f"{path}: is not a file that can be read twice; name a recording on a disk")
         with path.open("rb") as file:
             head = file.read(len(MAGIC))
             if not head:

@@ -8,12 +8,13 @@ from typing import Final
 
 from mcap.data_stream import ReadDataStream
 from mcap.exceptions import McapError
+from mcap.opcode import Opcode
 from mcap.records import Channel, Metadata, Schema
 
 from sdt_tools.recording.container.chunk import Segment
 
 HEAD: Final = struct.Struct("<BQ")
-UNREADABLE: Final = (McapError, struct.error, UnicodeDecodeError, IndexError, ValueError)
+UNREADABLE: Final = (McapError, struct.error, UnicodeDecodeError, IndexError, ValueError, OverflowError)
 """What the record classes raise on bytes that are not a record."""
 
 
@@ -39,6 +40,8 @@ class FileIndex:
     counts: Mapping[int, int] | None = None
     truncated: bool = False
     gaps: list[Gap] = field(default_factory=list)
+    harmless: list[str] = field(default_factory=list)
+    """Damage that costs no message."""
 
 
 def records(view: memoryview, start: int, end: int) -> Iterator[tuple[int, int, int]]:
@@ -53,3 +56,24 @@ def records(view: memoryview, start: int, end: int) -> Iterator[tuple[int, int, 
 def body_of(view: memoryview, offset: int, length: int) -> ReadDataStream:
     """The body of a record, for the record classes to read."""
     return ReadDataStream(BytesIO(view[offset : offset + length]))
+
+
+def take_record(view: memoryview, index: FileIndex, opcode: int, body: int, length: int) -> None:
+    """Take a schema, channel, metadata or attachment into ``index``; of two with one number the first counts.
+
+    A record that is damaged costs itself.
+    """
+    try:
+        if opcode == Opcode.SCHEMA:
+            schema = Schema.read(body_of(view, body, length))
+            if schema.id:  # zero says that there is none, and readers must not take it
+                index.schemas.setdefault(schema.id, schema)
+        elif opcode == Opcode.CHANNEL:
+            channel = Channel.read(body_of(view, body, length))
+            index.channels.setdefault(channel.id, channel)
+        elif opcode == Opcode.METADATA:
+            index.metadata.append(Metadata.read(body_of(view, body, length)))
+        elif opcode == Opcode.ATTACHMENT:
+            index.attachments.append((body - HEAD.size, HEAD.size + length))
+    except UNREADABLE:
+        return

@@ -7,17 +7,19 @@ are no record, because one of its lengths is damaged, the walk goes on at the ne
 import re
 import struct
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import Final
 
+import numpy as np
 from mcap.opcode import Opcode
-from mcap.records import Channel, Metadata, Schema
 
-from sdt_tools.recording.container.chunk import MAX_CHUNK_BYTES, DamagedChunkError, Segment, read_segment
+from sdt_tools.recording.container.chunk import DamagedChunkError, Segment, read_segment, walk_messages
 from sdt_tools.recording.container.file import MAGIC
-from sdt_tools.recording.container.records import HEAD, UNREADABLE, FileIndex, Gap, body_of, records
+from sdt_tools.recording.container.lengths import adds_up, chunk_fits
+from sdt_tools.recording.container.records import HEAD, FileIndex, Gap, records, take_record
 
-_CHUNK_HEAD: Final = struct.Struct("<QQQII")
-_CHUNK_FIXED: Final = _CHUNK_HEAD.size + 8  # and the name of the compression
+_TIMES: Final = struct.Struct("<QQ")
+_INDEX_HEAD_BYTES: Final = HEAD.size + 6  # channel, length of the entries
 _MESSAGE_FIXED: Final = 22
 _RUN_BYTES: Final = 1 << 20
 _KNOWN: Final = frozenset(Opcode)
@@ -41,69 +43,118 @@ class _Walk:
         self._message_indexes: dict[int, int] = {}
         self._loose = _LooseMessages(view)
         self._last_ns = 0
+        self._gap_is_open = False
+        self._walk()
+        self._settle()
+        self.index.segments += self._loose.segments()
+
+    def _walk(self) -> None:
+        view = self._view
+        ended = False
         before = at = len(MAGIC)
         while at + HEAD.size <= len(view):
             opcode, length = HEAD.unpack_from(view, at)
             body, end = at + HEAD.size, at + HEAD.size + length
             if not self._is_record(opcode, body, length):
-                # the length of the record before may be what is damaged; a chunk's has been checked
-                found = self._next_record(at if view[before] == Opcode.CHUNK else before + 1)
+                found = self._next_record(at if self._is_vouched(before, at) else before + 1)
                 if found is None:
                     self._cut(opcode, body)
                     break
-                self._skip(found)
+                self._skip()
                 before = at = found
                 continue
+            if opcode not in (Opcode.CHUNK, Opcode.MESSAGE) and self._is_chunk_by_another_name(body, length):
+                opcode = Opcode.CHUNK
             if opcode != Opcode.MESSAGE_INDEX:
                 self._settle()
-            if opcode in (Opcode.DATA_END, Opcode.FOOTER):
-                self.index.truncated = bytes(view[-len(MAGIC) :]) != MAGIC
-                break
+            if opcode == Opcode.FOOTER:
+                self.index.truncated = bytes(view[end : end + len(MAGIC)]) != MAGIC
+                if end + len(MAGIC) < len(view):
+                    self.index.harmless.append(f"{len(view) - end - len(MAGIC)} bytes follow its end")
+                return
+            ended = ended or opcode == Opcode.DATA_END
             self._take(opcode, body, length)
             before, at = at, end
-        self._settle()
-        self.index.segments += self._loose.segments()
+        if ended and bytes(view[-len(MAGIC) :]) == MAGIC:
+            self.index.truncated = False
+            self.index.harmless.append("its footer is damaged")
 
     def _is_record(self, opcode: int, body: int, length: int) -> bool:
         """Whether a whole record stands here, as far as its head can tell."""
-        if opcode == 0 or body + length > len(self._view):
+        end = body + length
+        if opcode == 0 or end > len(self._view):
             return False
-        return opcode != Opcode.CHUNK or _chunk_fits(self._view, body, length)
+        if opcode == Opcode.FOOTER:  # what follows it is the magic, or what is left of that
+            tail = bytes(self._view[end : end + len(MAGIC)])
+            return tail == MAGIC or (end + len(MAGIC) > len(self._view) and MAGIC.startswith(tail))
+        return opcode != Opcode.CHUNK or chunk_fits(self._view, body, length)
+
+    def _is_chunk_by_another_name(self, body: int, length: int) -> bool:
+        """Whether all but the kind of a record says that it is a chunk: its lengths, and a message index behind it."""
+        end = body + length
+        if end + HEAD.size > len(self._view) or self._view[end] != Opcode.MESSAGE_INDEX:
+            return False
+        _, index_length = HEAD.unpack_from(self._view, end)
+        index_body = end + HEAD.size
+        return (
+            adds_up(self._view, Opcode.CHUNK, body, length)
+            and index_body + index_length <= len(self._view)
+            and adds_up(self._view, Opcode.MESSAGE_INDEX, index_body, index_length)
+        )
+
+    def _is_vouched(self, before: int, at: int) -> bool:
+        """Whether the record before ``at`` is whole beyond doubt; else its length may be what is damaged."""
+        if before == at:
+            return True
+        body = before + HEAD.size
+        return adds_up(self._view, self._view[before], body, at - body)
 
     def _take(self, opcode: int, body: int, length: int) -> None:
         if opcode == Opcode.CHUNK:
             self._chunk = _chunk_at(self._view, body, length)
+            self._end_gap(self._chunk.start_ns)
             self._last_ns = self._chunk.end_ns
         elif opcode == Opcode.MESSAGE_INDEX and length >= 6:
             channel_id = int.from_bytes(self._view[body : body + 2], "little")
             self._message_indexes[channel_id] = body - HEAD.size
         elif opcode == Opcode.MESSAGE and length >= _MESSAGE_FIXED:
             self._last_ns = self._loose.add(body, length)
+            self._end_gap(self._last_ns)
         else:
-            _take_record(self._view, self.index, opcode, body, length)
+            take_record(self._view, self.index, opcode, body, length)
 
     def _settle(self) -> None:
-        """The chunk before is whole, with all its message indexes."""
+        """The chunk before is whole, with all its message indexes; indexes without a chunk tell what is lost."""
         if self._chunk is not None:
             self.index.segments.append(_settled(self._view, self.index, self._chunk, self._message_indexes))
+        elif (times := _indexed_times(self._view, self._message_indexes)) is not None:
+            self._note_gap(*times)
         self._chunk, self._message_indexes = None, {}
 
     def _cut(self, opcode: int, body: int) -> None:
         """The file ends here; of a chunk, what there is of it counts."""
         self._settle()
-        if opcode == Opcode.CHUNK and body + _CHUNK_HEAD.size <= len(self._view):
+        if opcode == Opcode.CHUNK and body + _TIMES.size <= len(self._view):
             self._chunk = _chunk_at(self._view, body, len(self._view) - body, cut=True)
 
-    def _skip(self, found: int) -> None:
-        """Note that nothing could be read up to ``found``."""
+    def _skip(self) -> None:
+        """Note that some bytes are no records: what they held lay between the message before and the one behind."""
         self._settle()
-        opcode, _ = HEAD.unpack_from(self._view, found)
-        times_at = found + HEAD.size + (6 if opcode == Opcode.MESSAGE else 0)
-        next_ns = self._last_ns
-        if opcode in (Opcode.CHUNK, Opcode.MESSAGE):
-            next_ns = int.from_bytes(self._view[times_at : times_at + 8], "little")
-        first_ns = min(self._last_ns or next_ns, next_ns)
-        self.index.gaps.append(Gap(first_ns, next_ns, "records between these times are unreadable"))
+        self._note_gap(self._last_ns, self._last_ns)
+        self._gap_is_open = True
+
+    def _note_gap(self, start_ns: int, end_ns: int) -> None:
+        gaps = self.index.gaps
+        if gaps and self._gap_is_open:  # still the same one: nothing was read in between
+            last = gaps.pop()
+            start_ns, end_ns = min(last.start_ns or start_ns, start_ns or last.start_ns), max(last.end_ns, end_ns)
+        gaps.append(Gap(start_ns, end_ns, "records between these times are unreadable"))
+
+    def _end_gap(self, next_ns: int) -> None:
+        """A message was read again."""
+        if self._gap_is_open:
+            self._note_gap(next_ns, next_ns)
+        self._gap_is_open = False
 
     def _next_record(self, start: int) -> int | None:
         """Where from ``start`` on records go on: the first of some that follow each other."""
@@ -126,50 +177,40 @@ class _Walk:
         return True
 
 
-def _chunk_fits(view: memoryview, body: int, length: int) -> bool:
-    """Whether the lengths in a chunk's head agree with each other."""
-    if length < _CHUNK_FIXED:
-        return False
-    start_ns, end_ns, size, _, name_length = _CHUNK_HEAD.unpack_from(view, body)
-    data_length_at = body + _CHUNK_HEAD.size + name_length
-    if start_ns > end_ns or size > MAX_CHUNK_BYTES or _CHUNK_FIXED + name_length > length:
-        return False
-    data_length = int.from_bytes(view[data_length_at : data_length_at + 8], "little")
-    return bool(_CHUNK_FIXED + name_length + data_length == length)
-
-
 def _chunk_at(view: memoryview, body: int, length: int, cut: bool = False) -> Segment:
-    start_ns, end_ns, *_ = _CHUNK_HEAD.unpack_from(view, body)
+    start_ns, end_ns = _TIMES.unpack_from(view, body)
     return Segment(body - HEAD.size, HEAD.size + length, start_ns, end_ns, cut=cut)
 
 
 def _settled(view: memoryview, index: FileIndex, chunk: Segment, message_indexes: Mapping[int, int]) -> Segment:
-    """``chunk`` with its message indexes; channels that it may announce are taken into ``index``."""
-    if not message_indexes or not set(message_indexes) <= set(index.channels):
-        try:
-            data = memoryview(read_segment(view, chunk))
-        except DamagedChunkError:
-            return chunk  # it is met, and reported, again when its messages are read
-        for opcode, body, length in records(data, 0, len(data)):
-            _take_record(data, index, opcode, body, length)
-    offsets = dict(message_indexes) or None
-    return Segment(chunk.offset, chunk.length, chunk.start_ns, chunk.end_ns, offsets, cut=chunk.cut)
+    """``chunk``, its times vouched for by its message indexes or its messages; channels in it come into ``index``.
 
-
-def _take_record(view: memoryview, index: FileIndex, opcode: int, body: int, length: int) -> None:
+    It keeps no message indexes: nothing says that none of them is missing.
+    """
+    times = (chunk.start_ns, chunk.end_ns)
+    known = not chunk.cut and set(message_indexes) <= set(index.channels)
+    if known and _indexed_times(view, message_indexes) == times:
+        return chunk
     try:
-        if opcode == Opcode.SCHEMA:
-            schema = Schema.read(body_of(view, body, length))
-            index.schemas[schema.id] = schema
-        elif opcode == Opcode.CHANNEL:
-            channel = Channel.read(body_of(view, body, length))
-            index.channels[channel.id] = channel
-        elif opcode == Opcode.METADATA:
-            index.metadata.append(Metadata.read(body_of(view, body, length)))
-        elif opcode == Opcode.ATTACHMENT:
-            index.attachments.append((body - HEAD.size, HEAD.size + length))
-    except UNREADABLE:
-        return  # a damaged record costs itself
+        data = memoryview(read_segment(view, chunk))
+    except DamagedChunkError:
+        return chunk  # it is met, and reported, again when its messages are read
+    for opcode, body, length in records(data, 0, len(data)):
+        if opcode in (Opcode.SCHEMA, Opcode.CHANNEL):
+            take_record(data, index, opcode, body, length)
+    logged = [message.log_ns for message in walk_messages(data)]
+    return replace(chunk, start_ns=min(logged), end_ns=max(logged)) if logged else chunk
+
+
+def _indexed_times(view: memoryview, message_indexes: Mapping[int, int]) -> tuple[int, int] | None:
+    """First and last log time by the message indexes; None where they have no entries."""
+    times = []
+    for at in message_indexes.values():
+        entries_at = at + _INDEX_HEAD_BYTES
+        length = min(int.from_bytes(view[entries_at - 4 : entries_at], "little"), len(view) - entries_at)
+        found = np.frombuffer(view, "<u8", length // 16 * 2, entries_at)[::2]
+        times += [int(found.min()), int(found.max())] if found.size else []
+    return (min(times), max(times)) if times else None
 
 
 class _LooseMessages:
