@@ -40,12 +40,12 @@ class StampLog:
         self._times: dict[str, tuple[array[int], array[int]]] = {}
 
     def see(self, topic: str, received_ns: int, stamp_ns: int) -> None:
-        """Take note of a message; times are not negative, and not later than the year 2116."""
+        """Take note of a message; times are not negative, and those later than the year 2116 are taken for it."""
         times = self._times.get(topic)
         if times is None:
             times = self._times[topic] = array("q"), array("q")
-        times[0].append(received_ns)
-        times[1].append(stamp_ns)
+        times[0].append(min(received_ns, _LATEST_NS))
+        times[1].append(min(stamp_ns, _LATEST_NS))
 
     def topics(self) -> Iterator[tuple[str, TopicStamps]]:
         """What was seen, topic by topic in the order of their names."""
@@ -65,5 +65,5 @@ def read_stamps(file: McapReader, topics: Mapping[int, str]) -> StampLog:
         for raw in walk_messages(file.unpacked(segment) or b""):
             topic = topics.get(raw.channel_id)
             if topic is not None:
-                log.see(topic, min(raw.log_ns, _LATEST_NS), min(raw.publish_ns, _LATEST_NS))
+                log.see(topic, raw.log_ns, raw.publish_ns)
     return log
