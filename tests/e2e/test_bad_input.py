@@ -126,7 +126,8 @@ def test_errors_without_labels_say_what_to_do(sdt: Sdt, model: Path, tmp_path: P
     ("words", "said"),
     [
         (["fly"], "No such command 'fly'"),
-        (["record", "scene"], "Missing option '--out'"),
+        (["record", "scene"], "name either --out, for one recording, or --session, for takes"),
+        (["repair", "r.mcap"], "Missing option '--out'"),
         (["record", "scene", "--seed", "-1", "--out", "x"], "'--seed'"),
         (["record", "scene", "--seconds", "inf", "--out", "x"], "seconds"),
         (["import", "lidar-csv", "x.csv", "--hz", "inf", "--out", "x"], "--hz inf"),
