@@ -32,7 +32,7 @@ def sweep_figure(tables: FollowTables, out: Path) -> None:
     figure = Figure(figsize=(6.5, 3.8), layout="constrained")
     FigureCanvasAgg(figure)
     axes = figure.subplots()
-    for level, colour in _LEVEL_COLOURS.items():
+    for place, (level, colour) in enumerate(_LEVEL_COLOURS.items()):
         mine = [row for row in rows if row["level"] == level]
         weights, middle = [row["weight"] for row in mine], [row["val_accuracy"][1] for row in mine]
         axes.plot(weights, middle, "o-", color=colour, label=f"level {level}")
@@ -41,9 +41,10 @@ def sweep_figure(tables: FollowTables, out: Path) -> None:
         )
         for row in mine:
             note = f"{row['least_certified']}"
-            axes.annotate(note, (row["weight"], row["val_accuracy"][1]), (4, 5), textcoords="offset points", fontsize=7)
+            at, offset = (row["weight"], row["val_accuracy"][1]), (5, 12 - 10 * place)
+            axes.annotate(note, at, offset, textcoords="offset points", fontsize=7, color=colour)
     axes.set(xscale="log", xlabel="λ", ylabel="validation accuracy", ylim=(0.0, 1.0))
-    axes.set_title("Strictness costs accuracy; numbers are certified domains of 240 in the worst network", fontsize=9)
+    axes.set_title("Strictness and accuracy; numbers are certified domains of 240 in the worst network", fontsize=9)
     axes.yaxis.set_major_formatter(PercentFormatter(1.0, decimals=0))
     axes.grid(alpha=0.25)
     axes.legend(frameon=False)

@@ -63,7 +63,7 @@ def run_follow_study(out: Path, config: FollowStudyConfig, workers: int, progres
         real_time_factor=evaluation.real_time_factor,
     )
     tables.networks.write_parquet(out / "networks.parquet")
-    tables.runs.write_parquet(out / "runs.parquet")
+    tables.runs.drop("model").write_parquet(out / "runs.parquet")  # a path of this machine; ``network`` names it
     return write_follow_report(tables, out)
 
 
