@@ -52,6 +52,7 @@ def build(
     from sdt_tools.config import parse_config, read_toml
     from sdt_tools.dataset.build import build_dataset
     from sdt_tools.dataset.config import DatasetConfig
+    from sdt_tools.errors import UsageError
     from sdt_tools.robustness.conflicts import conflict_check
 
     options = {
@@ -66,6 +67,8 @@ def build(
         "conflict_level": conflict_level,
         "allow_conflicts": allow_conflicts,
     }
+    if validation and val_share is not None:
+        raise UsageError("--validation and --val-share: choose one, recordings to validate with or a share of them")
     given = {name: value for name, value in options.items() if value is not None}
     file_values = {} if config is None else read_toml(config)
     settings = parse_config(DatasetConfig, file_values, str(config))

@@ -14,6 +14,9 @@ if TYPE_CHECKING:
 
 app = typer.Typer(no_args_is_help=True, help="Train networks on data sets.")
 
+_OF_DOMAINS = {"safety.inner": "--inner", "safety.weight": "--lambda", "safety.delta": "--delta"}
+"""Options that say how a network is held to safety domains, by the setting that each stands for."""
+
 
 @app.callback()
 def train() -> None:
@@ -111,6 +114,7 @@ def follow(
 def _settings(config: Path | None, asked: "Mapping[str, object]") -> "FollowTrainingConfig":
     """What a file or the recipe for the specification and architecture asked for says, and then the options."""
     from sdt_tools.config import load_config, parse_config
+    from sdt_tools.errors import UsageError
     from sdt_tools.training.follow import FollowTrainingConfig
     from sdt_tools.training.recipes import recipe_for
     from sdt_tools.training.specification import SpecificationConfig
@@ -129,7 +133,13 @@ def _settings(config: Path | None, asked: "Mapping[str, object]") -> "FollowTrai
         for step in tables:
             table = table[step]
         table[key] = value
-    return parse_config(FollowTrainingConfig, values, "the options")
+    settings = parse_config(FollowTrainingConfig, values, "the options")
+    idle = [option for name, option in _OF_DOMAINS.items() if name in asked]
+    if idle and settings.specification.empty:
+        raise UsageError(
+            f"{', '.join(idle)}: nothing without safety domains; add --level or --domains, or leave it out"
+        )
+    return settings
 
 
 def _document(summary: "TrainingSummary") -> dict[str, object]:

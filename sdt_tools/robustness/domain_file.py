@@ -33,8 +33,8 @@ _LABELS: Final = {motion.label: motion for motion in MotionClass}
 class Interval(Config):
     """Ranges from ``lower_m`` to ``upper_m``, both included."""
 
-    lower_m: float = Field(ge=0.0, le=MAX_RANGE_M)
-    upper_m: float = Field(ge=0.0, le=MAX_RANGE_M)
+    lower_m: float = Field(ge=0.0, le=MAX_RANGE_M, strict=True)
+    upper_m: float = Field(ge=0.0, le=MAX_RANGE_M, strict=True)
 
     @model_validator(mode="after")
     def _ordered(self) -> "Interval":
@@ -57,11 +57,11 @@ class BoxPart(Interval):
 class DomainSpec(Config):
     """One ``[[domain]]``."""
 
-    name: str = Field(min_length=1)
+    name: str = Field(pattern=r"^[\w .,:+-]+$")
     allowed: tuple[str, ...]
     others: Interval = Interval(lower_m=0.0, upper_m=MAX_RANGE_M)
     rays: tuple[int, int] | None = None
-    width: int = Field(default=1, ge=1)
+    width: int = Field(default=1, ge=1, le=RAYS, strict=True)
     near: Interval | None = None
     box: tuple[BoxPart, ...] | None = Field(default=None, min_length=1)
 
@@ -128,6 +128,8 @@ def _domain_set(spec: DomainSpec) -> DomainSet:
 
 def _check_rays(rays: tuple[int, int]) -> None:
     first, last = rays
+    if first > last:
+        raise ValueError(f"rays {first} to {last}: the first comes after the last")
     if not 0 <= first <= last < RAYS:
         raise ValueError(f"rays {first} to {last} are not on a scan, whose rays are 0 to {RAYS - 1}")
 

@@ -117,7 +117,7 @@ def run_loop(
         network.parameters(), lr=config.learning_rate.peak, weight_decay=config.weight_decay, foreach=True
     )
     history = snapshot.restore(network, optimizer) if snapshot else []
-    satisfied: bool | None = None
+    satisfied = safety.satisfied(_safety_record(history[-1])) if safety and history else None
     with one_torch_thread(), torch.random.fork_rng(devices=[]):
         try:
             for epoch in range(len(history) + 1, config.epochs + config.extra_epochs + 1):
@@ -151,6 +151,8 @@ def _epoch(
     network.eval()
     val_loss, val_accuracy, val_forward_recall = _validate(network, validation)
     safe = safety.measure() if safety else None
+    if safe and math.isnan(safe.bound):
+        raise RunError(f"training diverged in epoch {epoch}: the safety bound is no number; lower learning_rate.peak")
     record = EpochRecord(
         epoch=epoch,
         learning_rate=rate,
@@ -163,6 +165,14 @@ def _epoch(
         **(vars(safe) if safe else {}),
     )
     return record, safety.satisfied(safe) if safety and safe else None
+
+
+def _safety_record(record: EpochRecord) -> SafetyRecord:
+    """What an epoch with domains noted of them."""
+    assert record.bound is not None
+    assert record.certified_share is not None
+    assert record.worst_margin is not None
+    return SafetyRecord(record.bound, record.certified_share, record.worst_margin)
 
 
 def _descend(

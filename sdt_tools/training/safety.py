@@ -42,8 +42,8 @@ class SafetyConfig(Config):
 
     Shares are of the planned steps: none before ``start_share``, all of the weight and range after ``ramp_share``
     more. Beyond the planned steps, which are gone when the bound is still above δ, the weight grows: by ``late_growth``
-    in as many steps again as were planned. ``compress`` takes log(1 + loss) of each domain's loss. ``domains_a_step``
-    are drawn by chance, or all taken where there are no more.
+    in as many steps again as were planned, and no further. ``compress`` takes log(1 + loss) of each domain's loss.
+    ``domains_a_step`` are drawn by chance, or all taken where there are no more.
     """
 
     inner: Literal["ibp", "pgd"] = "ibp"
@@ -172,7 +172,7 @@ def ramp(config: SafetyConfig, progress: float) -> float:
 
 def weight(config: SafetyConfig, progress: float) -> float:
     """λ at the share ``progress`` of the planned steps: it grows along the ramp, and again when they are gone."""
-    return config.weight * ramp(config, progress) * math.pow(config.late_growth, max(0.0, progress - 1.0))
+    return config.weight * ramp(config, progress) * math.pow(config.late_growth, min(max(0.0, progress - 1.0), 1.0))
 
 
 def narrowed(

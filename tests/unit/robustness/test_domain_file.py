@@ -71,6 +71,7 @@ NOT_FORWARD = '["stay", "backward", "left_backward", "right_backward"]'
         (GOOD.replace(NOT_FORWARD, "[]"), "allowed names no class"),
         (GOOD.replace('"stay"', '"halt"'), "allowed has 'halt', but the classes are stay, forward"),
         (GOOD.replace("upper_m = 0.2", "upper_m = -0.2"), "upper_m"),
+        (GOOD.replace("upper_m = 0.2", 'upper_m = "0.2"'), "upper_m"),
         (GOOD.replace("upper_m = 4.0", "upper_m = 25.0"), "upper_m"),
         (
             GOOD.replace("lower_m = 0.0, upper_m = 0.2", "lower_m = 0.3, upper_m = 0.2"),

@@ -199,3 +199,16 @@ def test_a_bound_that_is_not_reached_is_told_and_the_checkpoint_kept(dataset: Pa
     summary = train_follow(dataset, hopeless, tmp_path / "model")
     assert summary.satisfied is False
     assert load_checkpoint(tmp_path / "model").card.metrics["satisfied"] is False
+
+
+def test_a_training_interrupted_in_its_extra_epochs_goes_on_to_the_last_of_them(dataset: Path, tmp_path: Path) -> None:
+    hopeless = SAFE.model_copy(
+        update={
+            "safety": SafetyConfig(delta=1e-9),
+            "loop": SAFE.loop.model_copy(update={"epochs": 1, "extra_epochs": 4}),
+        }
+    )
+    with pytest.raises(KeyboardInterrupt):
+        train_follow(dataset, hopeless, tmp_path / "model", Stop(3))
+    summary = train_follow(dataset, hopeless, tmp_path / "model")
+    assert (summary.last.epoch, summary.satisfied) == (5, False)

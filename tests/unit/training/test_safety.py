@@ -177,4 +177,6 @@ def adversarially_train(network: FollowNet, data: Batch, epochs: int) -> None:
 
 def test_lambda_grows_when_the_planned_steps_are_gone() -> None:
     config = SafetyConfig(weight=2.0, start_share=0.1, ramp_share=0.5, late_growth=100.0)
-    assert [weight(config, progress) for progress in (0.05, 0.35, 0.6, 1.0, 1.5)] == pytest.approx([0, 1, 2, 2, 20])
+    assert [weight(config, progress) for progress in (0.05, 0.35, 0.6, 1.0, 1.5, 2.0, 40.0)] == pytest.approx(
+        [0, 1, 2, 2, 20, 200, 200]
+    )

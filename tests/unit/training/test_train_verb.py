@@ -6,7 +6,7 @@ from nearest_object import write_dataset
 from typer.testing import CliRunner
 
 from sdt_tools.cli.train import app
-from sdt_tools.errors import ConfigError, DatasetError, OutputExistsError
+from sdt_tools.errors import ConfigError, DatasetError, OutputExistsError, UsageError
 
 SMALL = """
 [architecture]
@@ -62,3 +62,9 @@ def test_bad_input_is_refused_by_its_name(dataset: Path, config: Path, tmp_path:
         run(dataset, "--out", dataset)
     with pytest.raises(ConfigError, match=r"the options: 'loop\.epochs': input should be greater than or equal to 1"):
         run(dataset, "--out", tmp_path / "model", "--epochs", 0)
+
+
+@pytest.mark.parametrize("options", [("--inner", "pgd"), ("--level", "0", "--lambda", "5"), ("--delta", "0.1")])
+def test_options_about_domains_want_domains(dataset: Path, tmp_path: Path, options: tuple[str, ...]) -> None:
+    with pytest.raises(UsageError, match="nothing without safety domains; add --level or --domains"):
+        run(dataset, "--out", tmp_path / "model", *options)
