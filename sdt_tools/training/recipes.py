@@ -1,7 +1,7 @@
 """Settings that were found to work, by safety level and architecture: where a training without a configuration starts.
 
-At level 0 ranges are clipped at 2.5 m: a few thousand scans do not teach what lies farther, and its variety costs two
-points of accuracy. The plain network is certified by one schedule and one λ at every level. It sees ranges up
+At level 0 ranges are clipped at 2.5 m: a few thousand scans do not teach what lies farther, and its variety costs a
+point of accuracy. The plain network is certified by one schedule and one λ at every level. It sees ranges up
 to 20 m: clipped at the domains' 4 m or less it finds no way to meet them but a constant answer. The gated network keeps
 the clip of level 0, which makes all levels one problem, and begins with the data alone. Its gate is wider than it need
 be: of eight channels a layer so many can die before the domains come in that from a few thousand frames it never opens.
