@@ -97,11 +97,12 @@ class Session:
         def open_writer(path: Path, notes: Mapping[str, str], start_ns: int, realtime: bool) -> RecordingWriter:
             return RecordingWriter(path, INFO, CONFIG, notes=notes, start_ns=start_ns, realtime=realtime)
 
-        recorder.begin(
-            T0, open_writer, lambda: Tally(decisions.decisions, decisions.forced, pace.missed + decisions.missed)
-        )
+        def tally() -> Tally:
+            return Tally(decisions.decisions, decisions.forced, pace.missed + decisions.missed)
+
         observers = [Fingers(control, keys)] if control is not None and keys is not None else []
         loop = LiveLoop(source, self.wheels, decisions, pace, observers, recorder)
+        recorder.begin(T0, open_writer, tally, loop.settle)
         try:
             return loop.run(Interrupt())
         finally:
