@@ -33,7 +33,7 @@ RATES = RateConfig()
 
 
 class PreparedSource:
-    """Scans at 50 Hz and raw pictures at 30, by the host's time; ``burst`` more pictures come at once, raw or encoded."""
+    """Scans at 50 Hz and raw pictures at 30, by the host's time; ``burst`` more come at once, raw or encoded."""
 
     def __init__(
         self, clock: HostClock, pictures: np.ndarray, scans_m: np.ndarray, burst: int = 0, raw_burst: bool = False
