@@ -97,7 +97,7 @@ def test_writing(benchmark: BenchmarkFixture, tmp_path: Path, images: bool) -> N
         return
     peers = {"none": CompressionType.NONE, "lz4": CompressionType.LZ4}
     seconds = {
-        name: seconds_of(lambda kind=kind: write_by_mcap(tmp_path / "peer.mcap", received, kind))  # type: ignore[misc]
+        name: seconds_of(lambda kind=kind: write_by_mcap(tmp_path / "peer.mcap", received, kind))
         for name, kind in peers.items()
     }
     ours_s = benchmark.stats.stats.min

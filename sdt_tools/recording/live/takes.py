@@ -259,7 +259,7 @@ class TakeRecorder:
                 writer.write(received)
             writer.note({"ending": "saved", "seconds": f"{seconds:.3f}"})
         if path.exists():
-            raise OutputExistsError(path)
+            raise OutputExistsError(path, None)
         part.rename(path)
         self._folder.started(path, first_ns, notes["trigger"])
         self._folder.saved(path, seconds, len(snapshot.messages))
