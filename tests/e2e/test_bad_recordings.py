@@ -40,10 +40,9 @@ MAKES_A_FILE = {
 
 
 @pytest.fixture
-def place(tmp_path: Path, sdt: Sdt) -> Path:
+def place(tmp_path: Path) -> Path:
     """A folder with a recording and with much that is none."""
     shutil.copy(SAMPLE, tmp_path / "r.mcap")
-    assert sdt("edit", "trim", "r.mcap", "--from", 1, "--to", 2, "--out", "other.mcap")[0] == 0
     (tmp_path / "text.mcap").write_text("no recording, however long it goes on " * 9)
     (tmp_path / "empty.mcap").touch()
     (tmp_path / "dir").mkdir()
@@ -87,6 +86,11 @@ def write_bag(path: Path, rays: int = 541, step_deg: float = 0.5, topics: tuple[
     return path
 
 
+def part_of(sdt: Sdt, recording: str, out: str) -> None:
+    """A second of ``recording``."""
+    assert sdt("edit", "trim", recording, "--from", 1, "--to", 2, "--out", out)[0] == 0
+
+
 def assert_refused_and_harmless(sdt: Sdt, place: Path, command: list[object], *words: str) -> None:
     before = everything(place)
     assert_refused(sdt(*command), *words)
@@ -94,24 +98,23 @@ def assert_refused_and_harmless(sdt: Sdt, place: Path, command: list[object], *w
 
 
 @pytest.mark.parametrize("verb", TAKES_A_RECORDING)
-@pytest.mark.parametrize(
-    ("given", "words"),
-    [
+def test_what_is_no_recording(sdt: Sdt, place: Path, verb: str) -> None:
+    for given, words in (
         ("none.mcap", ["none.mcap: no such recording"]),
         ("dir", ["dir: is a folder", ".mcap"]),
         ("text.mcap", ["text.mcap: not an MCAP file", "sdt import"]),
         ("empty.mcap", ["empty.mcap: is empty"]),
-    ],
-)
-def test_what_is_no_recording(sdt: Sdt, place: Path, verb: str, given: str, words: list[str]) -> None:
-    command = [word.format(given) for word in TAKES_A_RECORDING[verb]]
-    assert_refused_and_harmless(sdt, place, command, *words)
+    ):
+        command = [word.format(given) for word in TAKES_A_RECORDING[verb]]
+        assert_refused_and_harmless(sdt, place, command, *words)
 
 
 @pytest.mark.parametrize("verb", MAKES_A_FILE)
 def test_an_output_that_cannot_be_made(sdt: Sdt, place: Path, verb: str) -> None:
     """It exists, as a file or a folder; a file lies where its folder would be; its folder cannot be written."""
     np.savetxt(place / "drive.csv", np.full((3, 545), 2.5), fmt="%g", delimiter=",")
+    if "other.mcap" in MAKES_A_FILE[verb]:
+        part_of(sdt, "r.mcap", "other.mcap")
     if "bag" in MAKES_A_FILE[verb]:
         write_bag(place / "bag")
     if "folder" in MAKES_A_FILE[verb]:
@@ -197,6 +200,7 @@ def test_merges_of_one_recording(sdt: Sdt, place: Path) -> None:
 
 
 def test_recordings_that_overlap_are_merged_and_that_is_said(sdt: Sdt, place: Path) -> None:
+    part_of(sdt, "r.mcap", "other.mcap")
     code, said = sdt("edit", "merge", "r.mcap", "other.mcap", "--out", "new.mcap")
     assert code == 0
     assert "the originals overlap from 1735689601" in said

@@ -1,6 +1,7 @@
 """ROS 2 bags, opened: folders with their ``metadata.yaml``, or a single ``.mcap`` or ``.db3``."""
 
 import hashlib
+import sqlite3
 from collections.abc import Collection, Iterator, Mapping
 from contextlib import closing, contextmanager
 from dataclasses import dataclass
@@ -121,7 +122,7 @@ def _refusals(path: Path) -> Iterator[None]:
     except Exception as error:
         reason = " ".join(str(error).split()).rstrip(".")
         if (
-            not isinstance(error, ReaderError | OSError) or not reason
+            not isinstance(error, ReaderError | OSError | sqlite3.Error) or not reason
         ):  # it has stumbled over bytes: what it says of them is noise
             reason = "it ends too early, or its bytes make no sense"
         if "Profile is not ros2" in reason:
