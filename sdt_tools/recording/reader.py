@@ -19,6 +19,8 @@ from sdt_tools.recording.session import CONFIG_NAME, SESSION, STATS, derived_id
 from sdt_tools.recording.summary import TopicSummary
 from sdt_tools.recording.timing.stamps import StampLog, read_stamps
 
+ROS2: Final = "ros2"
+"""The profile of an MCAP that is a ROS 2 bag."""
 SCAN_BATCH: Final = 4096
 """Scans in a batch unless told otherwise: 18 MB."""
 SCAN_MIN_BYTES: Final = 17
@@ -41,11 +43,13 @@ class Recording:
             if is_ours(channel.topic, self._file.schema_name(channel), channel.message_encoding)
         }
         if not self._ours and not self.session:
+            is_bag = self._file.profile == ROS2
             self.close()
+            advice = "`sdt import ros2` makes a recording of the bag" if is_bag else "check that it is a recording"
             found = ", ".join(sorted({channel.topic for channel in channels.values()})) or "no topics at all"
             raise RecordingError(
                 f"{path}: holds none of our topics ({', '.join(topic.name for topic in TOPICS[:2])} …) in our schemas; "
-                f"it has {found}; check that it is a recording"
+                f"it has {found}; {advice}"
             )
 
     @classmethod

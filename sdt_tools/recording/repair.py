@@ -59,7 +59,7 @@ def repair_recording(path: Path, out: Path) -> RepairReport:
     Raises OutputExistsError where ``out`` exists; RecordingError for a path that is missing or not an MCAP, that holds
     nothing to save, and where the repaired file does not read back: then there is none.
     """
-    with McapReader(path) as source, new_file(out) as file:
+    with McapReader(path) as source, new_file(out, source.profile) as file:
         copy = RecordCopy(file)
         for attached in source.attachments():
             file.add_attachment(attached.name, attached.media_type, attached.data, attached.log_time)

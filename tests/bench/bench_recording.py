@@ -117,7 +117,7 @@ def test_writing(benchmark: BenchmarkFixture, tmp_path: Path, images: bool) -> N
     peers = {"none": CompressionType.NONE, "lz4": CompressionType.LZ4, "zstd": CompressionType.ZSTD}
     works: dict[str, Callable[[Path], object]] = {"ours": lambda path: write_ours(path, received)}
     for name, kind in peers.items():
-        works[name] = lambda path, kind=kind: write_by_mcap(path, received, kind)  # type: ignore[misc]
+        works[name] = lambda path, kind=kind: write_by_mcap(path, received, kind)
     best = side_by_side(works, tmp_path)
     benchmark.extra_info |= {
         "messages_per_s": round(len(received) / best["ours"].wall_s),

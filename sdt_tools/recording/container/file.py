@@ -88,7 +88,7 @@ class McapFile:
     such a refusal the file is cut back to its last whole record; ``drop_last_chunk`` makes room for the file's end.
     """
 
-    def __init__(self, path: Path, library: str, chunk_bytes: int = CHUNK_BYTES) -> None:
+    def __init__(self, path: Path, library: str, chunk_bytes: int = CHUNK_BYTES, profile: str = "") -> None:
         self.path = path
         self._chunk_bytes = chunk_bytes
         self._schemas: dict[tuple[str, str, bytes], Schema] = {}
@@ -102,7 +102,7 @@ class McapFile:
         self._counts: Counter[int] = Counter()
         self._size = 0
         self._file = _create(path)
-        self._write(MAGIC + _record(Header("", library)))
+        self._write(MAGIC + _record(Header(profile, library)))
 
     @property
     def size(self) -> int:

@@ -8,14 +8,16 @@ that is damaged, where whoever knows what it means says so (``lose``).
 import contextlib
 import logging
 import mmap
+import struct
 from collections.abc import Iterator, Mapping, Set
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise
 from pathlib import Path
 from types import TracebackType
-from typing import NamedTuple
+from typing import Final, NamedTuple
 
+from mcap.opcode import Opcode
 from mcap.records import Attachment, Channel, Metadata, Schema
 
 from sdt_tools.errors import RecordingError
@@ -35,6 +37,9 @@ from sdt_tools.recording.container.index import read_index
 from sdt_tools.recording.container.records import HEAD, FileIndex
 
 _log = logging.getLogger(__name__)
+_HEADER: Final = struct.Struct("<BQI")  # opcode, length of the record, length of the profile
+_HEADER_END: Final = len(MAGIC) + _HEADER.size
+_LONGEST_PROFILE: Final = 256
 
 
 @dataclass(frozen=True)
@@ -100,6 +105,13 @@ class McapReader:
     def beginning(self) -> memoryview:
         """The file's first megabyte."""
         return self._view[: 1 << 20]
+
+    @property
+    def profile(self) -> str:
+        """Whose conventions the file says it keeps, as ``ros2``; empty where it says none, or its header is damaged."""
+        opcode, _, length = _HEADER.unpack_from(self._view, len(MAGIC)) if len(self._view) >= _HEADER_END else (0, 0, 0)
+        known = opcode == Opcode.HEADER and length <= _LONGEST_PROFILE
+        return bytes(self._view[_HEADER_END : _HEADER_END + length]).decode(errors="replace") if known else ""
 
     @property
     def truncated(self) -> bool:

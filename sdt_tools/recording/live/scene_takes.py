@@ -75,7 +75,7 @@ def record_scene_takes(
         try:
             while True:
                 ending = _play_world(config, session, recorder, make_driver, interrupt, clock, observers(), progress)
-                if ending is not Ending.SOURCE or not recorder.wait_for_start(interrupt, clock.now_ns):
+                if ending is not Ending.SOURCE or not recorder.wait_for_start(interrupt, clock.now_ns, progress):
                     break
         except RunError as error:
             raise RunError(f"{folder}: {error}") from error.__cause__

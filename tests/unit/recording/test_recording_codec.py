@@ -156,7 +156,7 @@ def test_a_transform_keeps_its_quaternion() -> None:
 @pytest.mark.parametrize(("number", "level"), [(0, LogLevel.INFO), (1, LogLevel.DEBUG), (5, LogLevel.ERROR)])
 def test_levels_of_others_become_ours(number: int, level: LogLevel) -> None:
     log = message_class("foxglove.Log")()
-    log.level = number  # type: ignore[attr-defined]
+    log.level = number
     back = decode("/session/log", "foxglove.Log", log.SerializeToString(), T0)
     assert isinstance(back, LogEntry)
     assert back.level is level

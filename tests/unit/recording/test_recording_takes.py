@@ -40,6 +40,7 @@ from sdt_tools.recording.live.session_folder import ChangedConfigError, SessionF
 from sdt_tools.recording.live.take import Tally
 from sdt_tools.recording.live.takes import TakeRecorder
 from sdt_tools.recording.reader import Recording
+from sdt_tools.recording.trash import restore
 from sdt_tools.recording.writer import RecordingWriter
 
 
@@ -227,6 +228,54 @@ def test_the_last_take_kept_is_discarded_when_none_runs(session: Session) -> Non
     assert [(take.name, bool(take.trash)) for take in session.listed()] == [
         ("take_001.mcap", False),
         ("take_002.mcap", True),
+    ]
+
+
+def begun(path: Path) -> SessionFolder:
+    """A session with one take that was kept."""
+    folder = SessionFolder.create(path, Settings(), "the-session")
+    take = folder.next_path("take")
+    take.write_bytes(b"a take")
+    folder.started(take, T0)
+    folder.saved(take, 1.0, 1)
+    return folder
+
+
+def test_a_relative_folder_has_its_trash_too(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    folder = begun(Path("recordings/monday"))
+    folder.discard(Path("recordings/monday/take_001.mcap"), "", T0)
+    (take,) = folder.record.takes
+    assert (tmp_path / "recordings/monday" / take.trash / take.name).exists()
+
+
+def test_a_take_that_is_gone_is_not_the_last_one_kept(tmp_path: Path) -> None:
+    folder = begun(tmp_path / "s")
+    first = folder.last_kept()
+    assert first is not None
+    first.unlink()
+    assert folder.last_kept() is None
+
+
+def test_a_take_that_was_restored_is_kept_again_when_the_session_goes_on(tmp_path: Path) -> None:
+    folder = begun(tmp_path / "s")
+    folder.discard(tmp_path / "s/take_001.mcap", "", T0)
+    assert SessionFolder.resume(folder.folder, Settings()).last_kept() is None
+    restore(folder.folder, "take_001")
+    assert SessionFolder.resume(folder.folder, Settings()).last_kept() == tmp_path / "s/take_001.mcap"
+
+
+def test_whoever_presses_keys_is_told_what_came_of_it(tmp_path: Path) -> None:
+    shown: list[str] = []
+    control, signals = Control(), Interrupt()
+    recorder = TakeRecorder(begun(tmp_path / "s"), RateConfig(), None, False, control)
+    for wish in (Wish.DISCARD, Wish.DISCARD, Wish.QUIT):
+        control.want(wish)
+    assert not recorder.wait_for_start(signals, lambda: T0, lambda now: shown.append(now.state))
+    assert shown == [
+        "the source has ended",
+        "the source has ended (take_001 discarded)",
+        "the source has ended (nothing to discard)",
     ]
 
 

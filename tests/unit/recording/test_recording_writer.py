@@ -69,11 +69,11 @@ def test_the_stats_count_and_carry_what_is_noted(tmp_path: Path) -> None:
 )
 def test_the_identity_changes_with_what_the_recording_is_made_from(tmp_path: Path, other: dict[str, object]) -> None:
     usual = {"info": SourceInfo("scene", "plain", 7), "config_toml": CONFIG, "notes": {"model": "a"}}
-    with RecordingWriter(tmp_path / "usual.mcap", **usual) as one:  # type: ignore[arg-type]
+    with RecordingWriter(tmp_path / "usual.mcap", **usual) as one:
         pass
-    with RecordingWriter(tmp_path / "same.mcap", **usual) as same:  # type: ignore[arg-type]
+    with RecordingWriter(tmp_path / "same.mcap", **usual) as same:
         pass
-    with RecordingWriter(tmp_path / "other.mcap", **(usual | other)) as two:  # type: ignore[arg-type]
+    with RecordingWriter(tmp_path / "other.mcap", **(usual | other)) as two:
         pass
     assert one.recording_id == same.recording_id != two.recording_id
 
