@@ -55,7 +55,7 @@ def find_places(view: memoryview, segments: list[Segment], channel_ids: Set[int]
 
 def message_data(view: memoryview, segment: Segment, start: int, unpack: Unpack) -> bytes | None:
     """What the message that begins at ``start`` of ``segment`` holds; None where the segment cannot be unpacked."""
-    data = stored(view, segment)
+    data: bytes | memoryview | None = stored(view, segment)
     if data is None:
         data = unpack(segment)
     if data is None:
@@ -68,19 +68,17 @@ def _in_segment(
     view: memoryview, segment: Segment, channel_ids: Set[int], unpack: Unpack
 ) -> Int64[np.ndarray, "messages 3"]:
     """Stamp, time of receipt and place of each message."""
-    data = stored(view, segment)
     indexed = _indexed_starts(view, segment, channel_ids)
-    if data is not None and indexed is not None:
-        rows = _heads(data, indexed, channel_ids)
-        if rows is not None:
-            return rows
+    in_place = stored(view, segment)
+    rows = None if indexed is None or in_place is None else _heads(in_place, indexed, channel_ids)
+    if rows is not None:
+        return rows
     data = unpack(segment)
     if data is None:
         return np.empty((0, 3), np.int64)
-    if indexed is not None:
-        rows = _heads(data, indexed, channel_ids)
-        if rows is not None:
-            return rows
+    rows = None if indexed is None else _heads(data, indexed, channel_ids)
+    if rows is not None:
+        return rows
     walked = [
         (min(raw.publish_ns, _LATEST_NS), min(raw.log_ns, _LATEST_NS), raw.start - _HEAD_BYTES)
         for raw in walk_messages(data)

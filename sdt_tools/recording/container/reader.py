@@ -202,7 +202,7 @@ class McapReader:
         return find_places(self._view, self.segments(channel_ids), channel_ids, self.unpacked)
 
     def data_at(self, places: Places, row: int, unpack: Unpack) -> bytes | None:
-        """What message ``row`` of ``places`` holds; None where its chunk is damaged. ``unpack`` opens compressed ones."""
+        """What message ``row`` of ``places`` holds; None where its chunk, opened by ``unpack``, is damaged."""
         return message_data(self._view, places.segments[int(places.owners[row])], int(places.starts[row]), unpack)
 
     def unpacked(self, segment: Segment) -> bytes | memoryview | None:
