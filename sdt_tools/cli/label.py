@@ -44,9 +44,7 @@ def edit(
         Path | None, typer.Option(help="Predictions by sdt replay, shown as pre-labels in place of the journal's.")
     ] = None,
     model: Annotated[str | None, typer.Option(help="Which model's predictions, where the file has several.")] = None,
-    suspects: Annotated[
-        Path | None, typer.Option(help="File of suspect labels (Parquet or CSV), to go through.")
-    ] = None,
+    suspects: Annotated[Path | None, typer.Option(help="Suspect labels to go through (Parquet or CSV).")] = None,
     viewer: Annotated[bool, typer.Option("--viewer", help="Show each frame in Rerun's viewer as well.")] = False,
     json_output: JsonFlag = False,
 ) -> None:

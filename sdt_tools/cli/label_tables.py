@@ -10,17 +10,17 @@ from sdt_tools.labeling.stats import LabelStats
 
 def print_stats(console: Console, stats: Sequence[LabelStats]) -> None:
     """How far each recording is, what people said, and how far they agree."""
-    table = Table("recording", "frames", "by people", "", "with any label", "! conflicts", "settled", "≠ pre-labels")
+    table = Table("recording", "frames", "people", "any", "conflicts", "settled", "≠ pre-labels")
     for one in stats:
-        share = f"{one.human / one.frames:.0%}"
+        people = f"{one.human:,} ({one.human / one.frames:.0%})"
         against = f"{one.against_prelabels:,} of {one.both:,}"
-        cells = [one.frames, one.human, share, one.resolved, one.conflicts, one.settled, against]
-        table.add_row(one.recording.stem, *(f"{cell:,}" if isinstance(cell, int) else cell for cell in cells))
+        numbers = [f"{number:,}" for number in (one.resolved, one.conflicts, one.settled)]
+        table.add_row(one.recording.stem, f"{one.frames:,}", people, *numbers, against)
     console.print(table)
     counts = Table("class", "people", "pre-labels")
     for name in stats[0].kind.classes:
-        people, pre = (sum(of[name] for of in found) for found in _counts(stats))
-        counts.add_row(name, f"{people:,}", f"{pre:,}")
+        said = (sum(of[name] for of in found) for found in _counts(stats))
+        counts.add_row(name, *(f"{number:,}" for number in said))
     console.print(counts)
     for one in stats:
         _print_agreement(console, one)
@@ -42,4 +42,6 @@ def _print_agreement(console: Console, one: LabelStats) -> None:
     if one.strangers:
         console.print(f"  {one.strangers:,} acts are about no frame of the recording; they count for nothing")
     for line in one.broken_lines:
-        console.print(f"  {one.journal}:{line}: the line is broken off; it is kept, and counts for nothing")
+        console.print(
+            f"  {one.journal}:{line}: the line is broken off; it is kept, and counts for nothing", soft_wrap=True
+        )

@@ -47,7 +47,7 @@ def export_labels(recording: Path, kind: LabelKind, labels_dir: Path, out: Path,
         start_ns = int(labelled_frames(opened, kind).stamps_ns[0])
         acts = read_journal(journal_path(labels_dir, opened.stem, kind), opened.recording_id)
     said = standing(acts).sort("stamp_ns", "act_id") if every_word else resolve(acts)
-    table = said.with_columns(((pl.col("stamp_ns") - start_ns) / SECOND_NS).alias("time_s")).select(EXPORTED)
+    table = said.with_columns(((pl.col("stamp_ns") - start_ns) / SECOND_NS).round(9).alias("time_s")).select(EXPORTED)
     out.parent.mkdir(parents=True, exist_ok=True)
     part = out.with_name(f".{out.name}.part")
     table.write_csv(part)

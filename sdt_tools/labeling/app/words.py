@@ -14,7 +14,7 @@ from sdt_tools.labeling.review import is_open
 from sdt_tools.labeling.vocabulary import LabelSource
 from sdt_tools.terminal.raster import BLANK, style
 
-HINTS: Final = "? keys  ←→ go  n unlabelled  j disagreement  v range  f carry  a accept  u undo  Space play"
+HINTS: Final = " ? keys  ←→ go  n unlabelled  j differing  v range  f carry  u undo  Space play"
 COUNT_CELLS: Final = 7
 _ON: Final = Style(bold=True)
 
