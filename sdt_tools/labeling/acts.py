@@ -41,10 +41,15 @@ class Acts:
     broken_lines: tuple[int, ...] = ()
 
 
+def no_acts(path: Path) -> Acts:
+    """What a journal at ``path`` would hold before the first act."""
+    return Acts(path, journal_kind(path), pl.DataFrame(schema=COLUMNS))
+
+
 def parse_journal(data: bytes, path: Path, recording_id: str | None) -> Acts:
     """A whole journal file. Raises LabelError naming ``path`` and the line; see ``parse_acts``."""
     if HEADER.startswith(data):  # also one that was broken off while its header was written
-        return Acts(path, journal_kind(path), pl.DataFrame(schema=COLUMNS))
+        return no_acts(path)
     if not data.startswith(HEADER):
         raise LabelError(f"{path}:1: the header is not '{HEADER.decode().strip()}'; this is no label journal")
     return parse_acts(data[len(HEADER) :], path, recording_id, first_line=2, after_act=0)

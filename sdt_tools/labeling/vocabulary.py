@@ -2,6 +2,7 @@
 
 from enum import StrEnum
 from pathlib import Path
+from typing import Final
 
 from sdt_tools.errors import LabelError
 from sdt_tools.frames import Gesture, MotionClass
@@ -28,6 +29,9 @@ class LabelSource(StrEnum):
     COMMAND = "command"
     MODEL = "model"
 
+
+SETTLED_BY: Final = "settled:"
+"""Begins the labeler of an act that settles what people disagree about; the name of the one who settled it follows."""
 
 _CLASSES: dict[LabelKind, tuple[str, ...]] = {
     LabelKind.MOTION: tuple(motion.label for motion in MotionClass),

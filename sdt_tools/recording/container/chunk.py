@@ -99,6 +99,19 @@ def is_checked(view: memoryview, offset: int) -> bool:
     return view[offset] != Opcode.MESSAGE and _CHUNK_HEAD.unpack_from(view, offset)[5] != 0
 
 
+def stored(view: memoryview, segment: Segment) -> memoryview | None:
+    """What ``segment`` holds, where it lies in the file uncompressed; not held against a checksum. Else None."""
+    end = segment.offset + segment.length
+    if segment.loose:
+        return view[segment.offset : end]
+    head = segment.offset + _CHUNK_HEAD.size
+    if segment.cut or head + 8 > end:
+        return None
+    compressed = _CHUNK_HEAD.unpack_from(view, segment.offset)[6]
+    (length,) = struct.unpack_from("<Q", view, head)
+    return None if compressed or head + 8 + length > end else view[head + 8 : head + 8 + length]
+
+
 def ends_within_a_record(view: memoryview, segment: Segment, data: bytes | memoryview) -> bool:
     """Whether the last record in ``data``, of an unpacked chunk, reaches beyond it.
 

@@ -295,3 +295,27 @@ def test_two_programs_at_once_lose_nothing_and_a_killed_one_keeps_what_it_said(t
     assert on_disk["killed"][: len(shown)] == shown
     assert len(on_disk["killed"]) <= len(shown) + 1
     assert table["act_id"].to_list() == list(range(1, len(table) + 1))
+
+
+def test_news_are_what_others_have_appended_once(tmp_path: Path) -> None:
+    with Journal(tmp_path / "x.motion.csv", "r") as mine, Journal(tmp_path / "x.motion.csv", "r") as other:
+        say(mine, 1, "stay")
+        assert mine.news().is_empty()
+        say(other, 2, "stay")
+        say(other, 3, "stay")
+        say(mine, 4, "stay")  # continues after theirs, and does not lose them
+        assert mine.news()["stamp_ns"].to_list() == [2, 3]
+        assert mine.news().is_empty()
+        assert mine.last_act == 4
+        say(other, 5, "stay")
+        assert mine.news()["act_id"].to_list() == [5]
+
+
+def test_what_was_there_before_is_no_news(tmp_path: Path) -> None:
+    with Journal(tmp_path / "x.motion.csv", "r") as before:
+        say(before, 1, "stay")
+    with Journal(tmp_path / "x.motion.csv", "r") as after:
+        assert after.opened.table["stamp_ns"].to_list() == [1]
+        assert after.news().is_empty()
+    with pytest.raises(LabelError, match="closed"):
+        after.news()
