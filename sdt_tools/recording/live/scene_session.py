@@ -1,6 +1,7 @@
 """A recording of the scene, from its configuration to the closed file."""
 
 from collections.abc import Callable, Sequence
+from contextlib import nullcontext
 from dataclasses import replace
 from pathlib import Path
 
@@ -8,7 +9,8 @@ from pydantic import Field
 
 from sdt_tools.clock import FAST_EPOCH_NS, HostClock
 from sdt_tools.config import Config, dump_config
-from sdt_tools.protocols import Driver, Observer
+from sdt_tools.protocols import Chooser, Driver, Observer
+from sdt_tools.recording.live.control import Control
 from sdt_tools.recording.live.interrupt import Interrupt, deferred_interrupt
 from sdt_tools.recording.live.outcome import RecordingProgress, RecordingSummary
 from sdt_tools.recording.live.perturb import PerturbConfig, perturbation_of
@@ -38,28 +40,35 @@ class SceneRecordingConfig(Config):
     scene: SceneConfig = SceneConfig()
 
 
+MakeDriver = Callable[[str, SceneSource], Driver | Chooser]
+"""Builds the driver of a name for a scene that is about to begin."""
+
+
 def record_scene(
     config: SceneRecordingConfig,
     out: Path,
-    make_driver: Callable[[str, SceneSource], Driver],
+    make_driver: MakeDriver,
     observers: Sequence[Observer] = (),
     progress: Callable[[RecordingProgress], None] | None = None,
+    control: Control | None = None,
+    interrupt: Interrupt | None = None,
 ) -> RecordingSummary:
-    """Record the scene to ``out``; ``make_driver`` builds the driver of that name for the scene.
+    """Record the scene to ``out``; whoever holds ``control`` may pause, mark and end it.
 
-    Signals are heard until the file is closed. Raises ConfigError for an unknown scenario, OutputExistsError,
-    RecordingError where the disk refuses, and what ``make_driver`` raises.
+    Signals are heard until the file is closed, unless ``interrupt`` hears them already. Raises ConfigError for an
+    unknown scenario, OutputExistsError, RecordingError where the disk refuses, and what ``make_driver`` raises.
     """
-    with deferred_interrupt() as interrupt:
-        return _record_scene(config, out, make_driver, observers, progress, interrupt)
+    with nullcontext(interrupt) if interrupt is not None else deferred_interrupt() as heard:
+        return _record_scene(config, out, make_driver, observers, progress, control, heard)
 
 
 def _record_scene(
     config: SceneRecordingConfig,
     out: Path,
-    make_driver: Callable[[str, SceneSource], Driver],
+    make_driver: MakeDriver,
     observers: Sequence[Observer],
     progress: Callable[[RecordingProgress], None] | None,
+    control: Control | None,
     interrupt: Interrupt,
 ) -> RecordingSummary:
     clock = HostClock()
@@ -95,6 +104,7 @@ def _record_scene(
             perturb,
             progress,
             interrupt=interrupt,
+            control=control,
         )
     return replace(summary, size_bytes=writer.size)
 

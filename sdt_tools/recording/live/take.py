@@ -7,6 +7,7 @@ from time import perf_counter
 from sdt_tools.clock import SECOND_NS
 from sdt_tools.config import RateConfig
 from sdt_tools.frames import LogEntry, LogLevel, Received
+from sdt_tools.recording.live.control import Wish
 from sdt_tools.recording.live.disk import DiskSpace
 from sdt_tools.recording.live.gaps import GapCounter
 from sdt_tools.recording.live.outcome import Ending, RecordingProgress, RecordingSummary
@@ -114,6 +115,17 @@ class Take:
         self._pauses_ns.append(pause_ns)
         return (pause_ns[1] - pause_ns[0]) / SECOND_NS
 
+    def hear(self, wish: Wish, now_ns: int) -> Iterator[LogEntry]:
+        """Pause or resume, where that is the wish. The entry about a pause is to be recorded before it begins."""
+        if wish is Wish.TOGGLE:
+            wish = Wish.RESUME if self.paused else Wish.PAUSE
+        if wish is Wish.PAUSE and not self.paused:
+            yield LogEntry(now_ns, LogLevel.INFO, "paused: nothing is recorded until it is resumed", "pause")
+            self.pause(now_ns)
+        elif wish is Wish.RESUME and self.paused:
+            lasted_s = self.resume(now_ns)
+            yield LogEntry(now_ns, LogLevel.INFO, f"resumed after a pause of {lasted_s:.3f} s", "pause")
+
     def watch(self, now_ns: int) -> Iterator[LogEntry]:
         """Keep what was written safe; entries about drops and the disk. Raises what the file's writer raised."""
         self.sink.keep_safe()
@@ -167,6 +179,7 @@ class Take:
             missing=sum(gap.missing for gap in self._gaps.values()),
             disk_left_s=None if space is None else space.left_s,
             state=state,
+            paused=self.paused,
         )
 
 

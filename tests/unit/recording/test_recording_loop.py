@@ -1,5 +1,6 @@
 import signal
 from collections import Counter
+from contextlib import suppress
 from pathlib import Path
 
 import numpy as np
@@ -12,6 +13,7 @@ from sdt_tools.config import MotionConfig
 from sdt_tools.errors import RecordingError, RunError
 from sdt_tools.frames import MotionClass, MotionCommand, Received, Twist
 from sdt_tools.protocols import Observation
+from sdt_tools.recording.live.decide import STOP
 from sdt_tools.recording.live.gaps import GapCounter
 from sdt_tools.recording.live.outcome import Ending, RecordingProgress
 from sdt_tools.recording.live.perturb import Perturbation, PerturbConfig
@@ -61,7 +63,30 @@ def test_nothing_is_decided_before_the_first_scan_or_twice_on_one(tmp_path: Path
     setup = Rig(tmp_path / "r.mcap", TapeSource([image(0), scan(10), scan(40)]))
     setup.run(seconds=1.0)
     commands = [m for m in setup.read() if isinstance(m.message, MotionCommand)]
-    assert [m.message.stamp_ns for m in commands] == [T0 + 10 * PERIOD_NS]
+    assert [m.message.stamp_ns for m in commands if m.message.driver != STOP] == [T0 + 10 * PERIOD_NS]
+
+
+def test_a_robot_that_drives_and_sees_nothing_is_stopped_until_it_sees_again(tmp_path: Path) -> None:
+    setup = Rig(tmp_path / "r.mcap", TapeSource([scan(10), scan(40), scan(50), image(60)]))
+    setup.run(seconds=1.0)
+    commands = [m for m in setup.read() if isinstance(m.message, MotionCommand)]
+    blind, *_ = [m for m in commands if m.message.driver == STOP]
+    assert blind.received_ns == T0 + (10 + 11) * PERIOD_NS
+    assert blind.message.twist == setup.wheels.twists[1] == Twist(0.0, 0.0)
+    assert setup.log()[0].startswith("no scan for 0.2 s")
+    assert [m.message.driver for m in commands] == ["constant:forward", STOP, "constant:forward", "constant:forward", STOP]
+
+
+@pytest.mark.parametrize("happens", [{80: signal.SIGHUP}, {80: ConnectionResetError("gone")}, {}])
+def test_whatever_ends_it_before_its_time_the_last_command_is_a_stop(
+    tmp_path: Path, happens: dict[int, BaseException | int]
+) -> None:
+    setup = rig(tmp_path, happens=happens)
+    with suppress(RunError):
+        setup.run(seconds=60.0)
+    commands = [m for m in setup.read() if isinstance(m.message, MotionCommand)]
+    assert [(m.message.driver, m.message.twist) for m in commands[-1:]] == [(STOP, Twist(0.0, 0.0))]
+    assert {m.message.driver for m in commands[:-1]} == {"constant:forward"}
 
 
 def test_it_ends_when_the_source_does(tmp_path: Path) -> None:
