@@ -68,13 +68,19 @@ def test_nothing_is_decided_before_the_first_scan_or_twice_on_one(tmp_path: Path
 
 def test_a_robot_that_drives_and_sees_nothing_is_stopped_until_it_sees_again(tmp_path: Path) -> None:
     setup = Rig(tmp_path / "r.mcap", TapeSource([scan(10), scan(40), scan(50), image(60)]))
-    setup.run(seconds=1.0)
+    setup.run(seconds=60.0)
     commands = [m for m in setup.read() if isinstance(m.message, MotionCommand)]
     blind, *_ = [m for m in commands if m.message.driver == STOP]
     assert blind.received_ns == T0 + (10 + 11) * PERIOD_NS
     assert blind.message.twist == setup.wheels.twists[1] == Twist(0.0, 0.0)
     assert setup.log()[0].startswith("no scan for 0.2 s")
-    assert [m.message.driver for m in commands] == ["constant:forward", STOP, "constant:forward", "constant:forward", STOP]
+    assert [m.message.driver for m in commands] == [
+        "constant:forward",
+        STOP,
+        "constant:forward",
+        "constant:forward",
+        STOP,
+    ]
 
 
 @pytest.mark.parametrize("happens", [{80: signal.SIGHUP}, {80: ConnectionResetError("gone")}, {}])
