@@ -3,6 +3,7 @@
 import json
 import os
 import random
+import shlex
 import shutil
 import signal
 import subprocess
@@ -13,7 +14,16 @@ from contextlib import suppress
 from pathlib import Path
 
 import pytest
-from labeling_rig import LONGEST_S, QUIT, RIGHT, LabelingTerminal, record, rows_labelled, start_labeling
+from labeling_rig import (
+    LONGEST_S,
+    QUIT,
+    RIGHT,
+    LabelingTerminal,
+    record,
+    rows_labelled,
+    start_labeling,
+    terminal_environment,
+)
 
 SDT = [sys.executable, "-c", "from sdt_tools.cli.app import main; main()"]
 
@@ -82,12 +92,11 @@ def test_resizing_in_the_middle(tmp_path: Path, labeling: Callable[..., Labeling
     terminal.until(lambda: rows_labelled(journal, "anna") == [0], "not labelled")
     terminal.resize(50, 10)
     terminal.wait_for("50 × 10 is too small")
-    terminal.press(RIGHT + "2")
     terminal.resize(160, 50)
     terminal.shown = b""
     terminal.wait_for("left_backward")
     terminal.press(RIGHT + RIGHT + "3")
-    terminal.until(lambda: rows_labelled(journal, "anna") == [0, 2], "not labelled, or labelled while it was covered")
+    terminal.until(lambda: rows_labelled(journal, "anna") == [0, 2], "not labelled")
     terminal.press(QUIT)
     assert terminal.end() == 0
 
@@ -110,9 +119,7 @@ def test_the_end_of_a_terminal_is_the_end_of_the_app_and_nothing_is_lost(
     assert rows_labelled(tmp_path / "labels" / "drive.motion.csv", "anna") == list(range(10))
 
 
-@pytest.mark.parametrize(
-    "seed", [0, 1, pytest.param(2, marks=pytest.mark.slow), pytest.param(3, marks=pytest.mark.slow)]
-)
+@pytest.mark.parametrize("seed", [0, *(pytest.param(seed, marks=pytest.mark.slow) for seed in range(1, 6))])
 def test_what_was_shown_before_a_kill_is_on_disk(
     tmp_path: Path, labeling: Callable[..., LabelingTerminal], seed: int
 ) -> None:
@@ -184,10 +191,11 @@ def test_in_tmux_the_screen_is_what_it_should_be(tmp_path: Path) -> None:
     drive = record(tmp_path / "drive.mcap", 30)
     socket = str(tmp_path / "tmux")
     tmux = ["tmux", "-S", socket, "-f", "/dev/null"]
-    command = f"{sys.executable} -c 'from sdt_tools.cli.app import main; main()' label edit {drive} --labels {tmp_path} --labeler anna"
+    command = shlex.join([*SDT, "label", "edit", str(drive), "--labels", str(tmp_path), "--labeler", "anna"])
 
     def call(*words: str) -> str:
-        return subprocess.run([*tmux, *words], capture_output=True, text=True, check=True).stdout
+        done = subprocess.run([*tmux, *words], env=terminal_environment(), capture_output=True, text=True, check=True)
+        return done.stdout
 
     def screen_with(words: str) -> list[str]:
         end_s = time.monotonic() + LONGEST_S
