@@ -165,6 +165,16 @@ def test_a_file_cut_anywhere_is_read_as_far_as_it_goes(tmp_path: Path) -> None:
     assert read_before == 48
 
 
+@pytest.mark.parametrize("tenths", range(1, 10))
+def test_a_cut_is_no_damage(tmp_path: Path, tenths: int) -> None:
+    whole = write(tmp_path / "r.mcap", DRIVE, chunk_bytes=500_000).read_bytes()
+    (tmp_path / "cut.mcap").write_bytes(whole[: len(whole) * tenths // 10])
+    with Recording.open(tmp_path / "cut.mcap") as recording:
+        assert list(recording.messages())
+        assert recording.truncated
+        assert recording.damage == ()
+
+
 def test_an_image_chunk_that_is_cut_gives_its_first_images(tmp_path: Path) -> None:
     path = write(tmp_path / "r.mcap", [image(n) for n in range(20)])
     data = path.read_bytes()
