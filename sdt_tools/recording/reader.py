@@ -16,6 +16,7 @@ from sdt_tools.recording.messages.topics import LIDAR_SCAN, TOPICS, is_ours
 from sdt_tools.recording.series import ScanSeries, joined
 from sdt_tools.recording.session import CONFIG_NAME, SESSION, STATS, derived_id
 from sdt_tools.recording.summary import TopicSummary
+from sdt_tools.recording.timing.pauses import Pauses, pauses_in
 from sdt_tools.recording.timing.stamps import StampLog, read_stamps
 
 SCAN_BATCH: Final = 4096
@@ -93,6 +94,11 @@ class Recording:
     def stats(self) -> Mapping[str, str]:
         """The metadata ``sdt.stats``; empty where the recording was cut off."""
         return self._metadata(STATS)
+
+    @property
+    def pauses(self) -> Pauses:
+        """When nothing was recorded because somebody wanted it so; half-open, in host time."""
+        return pauses_in(self._file)
 
     @property
     def recording_id(self) -> str:

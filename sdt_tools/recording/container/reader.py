@@ -15,7 +15,7 @@ from pathlib import Path
 from types import TracebackType
 from typing import NamedTuple
 
-from mcap.records import Attachment, Channel, Metadata, Schema
+from mcap.records import Attachment, Channel, Header, Metadata, Schema
 
 from sdt_tools.errors import RecordingError
 from sdt_tools.recording.container.attachments import read_attachment
@@ -97,6 +97,11 @@ class McapReader:
     def beginning(self) -> memoryview:
         """The file's first megabyte."""
         return self._view[: 1 << 20]
+
+    @property
+    def header(self) -> Header:
+        """The profile that the file keeps to and the library that wrote it; empty where it does not say."""
+        return self._index.header
 
     @property
     def truncated(self) -> bool:

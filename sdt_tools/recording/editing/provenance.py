@@ -83,13 +83,12 @@ def write_beginning(file: McapFile, sources: Sequence[McapReader], recording_id:
                 written.append(entries)
 
 
-def write_end(file: McapFile, edited: EditedRecording) -> None:
-    """``sdt.stats`` with what is true of the new recording, and ``sdt.edit``.
+def write_end(file: McapFile, edited: EditedRecording, stats: Mapping[str, str]) -> None:
+    """``sdt.stats`` with what is true of the new recording, ``stats`` that were counted in it, and ``sdt.edit``.
 
     What the originals' stats say of drops, gaps or decisions is about the whole of each: it is not taken over.
     """
-    counts = {f"count.{topic}": str(count) for topic, count in edited.messages.items()}
-    file.add_metadata(STATS, counts | {"seconds": f"{edited.seconds:.3f}"})
+    file.add_metadata(STATS, {**stats, "seconds": f"{edited.seconds:.3f}"})
     originals = [
         {
             "name": original.path.name,
@@ -134,6 +133,6 @@ def _write_attachments(file: McapFile, sources: Sequence[McapReader]) -> None:
             what = (attached.name, hashlib.sha256(attached.data).digest())
             if what not in written:
                 name = f"{source.path.stem}.{attached.name}" if attached.name in names else attached.name
-                file.add_attachment(name, attached.media_type, attached.data, attached.log_time)
+                file.add_attachment(name, attached.media_type, attached.data, attached.log_time, attached.create_time)
                 written.add(what)
         names |= {name for name, _ in written}

@@ -20,6 +20,9 @@ from sdt_tools.recording.messages.schemas import message_class, schema_data
 from sdt_tools.recording.messages.topics import CAMERA_IMAGE, TOPIC_BY_NAME, Topic, is_ours
 from sdt_tools.recording.reader import Recording
 from sdt_tools.recording.session import CONFIG_MEDIA_TYPE, CONFIG_NAME, SESSION, STATS
+from sdt_tools.recording.timing.pauses import pauses_of
+from sdt_tools.recording.timing.stamps import StampLog
+from sdt_tools.recording.timing.summary import ENTRY, timing_entries, timing_of
 
 
 class Carried(NamedTuple):
@@ -101,6 +104,7 @@ class Incoming:
         self._file = file
         self._about = about
         self._channels: dict[str, int] = {}
+        self._stamps = StampLog()
         file.add_metadata(SESSION, about.session)
 
     def take(self, carried: Carried) -> None:
@@ -117,12 +121,14 @@ class Incoming:
         data = message.SerializeToString(deterministic=True)
         compress = topic.name != CAMERA_IMAGE  # JPEG does not compress
         self._file.add_message(number, received_ns, stamp_ns, data, compress)
+        self._stamps.see(topic.name, received_ns, stamp_ns)
 
     def close(self, stats: Mapping[str, str]) -> dict[str, int]:
-        """Write ``sdt.stats``: the original's with ``stats`` added and counts put right. The counts by topic."""
+        """Write ``sdt.stats``: the original's with ``stats`` added, counts and timing put right. The counts by topic."""
         self._file.finish_chunks()
         counts = self._file.counts
-        kept = {name: value for name, value in self._about.stats.items() if not name.startswith("count.")}
+        kept = {name: value for name, value in self._about.stats.items() if not name.startswith(("count.", ENTRY))}
         counted = {f"count.{topic}": str(count) for topic, count in counts.items()}
-        self._file.add_metadata(STATS, {**counted, **kept, **stats})
+        timing = timing_entries(timing_of(self._stamps, pauses_of(kept)))
+        self._file.add_metadata(STATS, {**counted, **timing, **kept, **stats})
         return counts

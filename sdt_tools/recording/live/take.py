@@ -12,6 +12,7 @@ from sdt_tools.recording.live.gaps import GapCounter
 from sdt_tools.recording.live.outcome import Ending, RecordingProgress, RecordingSummary
 from sdt_tools.recording.live.sink import Sink
 from sdt_tools.recording.messages.topics import CAMERA_IMAGE, LIDAR_SCAN, topic_of
+from sdt_tools.recording.timing.pauses import PAUSES, pauses_text
 
 
 @dataclass(frozen=True)
@@ -177,7 +178,7 @@ def stats_of(summary: RecordingSummary) -> dict[str, str]:
         **{f"missing.{topic}": str(count) for topic, count in summary.missing.items()},
     }
     if summary.pauses_ns:
-        stats["pauses_ns"] = " ".join(f"{start_ns}-{end_ns}" for start_ns, end_ns in summary.pauses_ns)
+        stats[PAUSES] = pauses_text(summary.pauses_ns)
     return stats
 
 

@@ -19,6 +19,7 @@ from sdt_tools.recording.live.outcome import Ending, RecordingProgress
 from sdt_tools.recording.live.session_folder import SessionFolder
 from sdt_tools.recording.live.sink import DirectSink, QueuedSink
 from sdt_tools.recording.live.take import Take, Tally, stats_of
+from sdt_tools.recording.timing.pauses import paused_entry, resumed_entry
 from sdt_tools.recording.writer import RecordingWriter
 
 _LISTEN_S: Final = 0.05
@@ -175,11 +176,10 @@ class TakeRecorder:
         elif wish is Wish.SAVE and self._keep_last is not None:
             self._keep_last.trigger(act.text or "a key", now_ns)
         elif wish is Wish.PAUSE and running is not None and not running.take.paused:
-            yield LogEntry(now_ns, LogLevel.INFO, "paused: nothing is recorded until it is resumed", "pause")
+            yield paused_entry(now_ns)
             running.take.pause(now_ns)
         elif wish is Wish.RESUME and running is not None and running.take.paused:
-            lasted_s = running.take.resume(now_ns)
-            yield LogEntry(now_ns, LogLevel.INFO, f"resumed after a pause of {lasted_s:.3f} s", "pause")
+            yield resumed_entry(now_ns, running.take.resume(now_ns))
         if wish in (Wish.START, Wish.NEXT) and self._running is None:
             self._start(now_ns)
 
