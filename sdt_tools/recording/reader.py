@@ -1,6 +1,7 @@
 """Recordings, read: streaming, a chunk at a time, whole or cut off or damaged."""
 
 import zlib
+from collections import Counter
 from collections.abc import Collection, Iterator, Mapping
 from functools import cached_property
 from pathlib import Path
@@ -10,9 +11,9 @@ from typing import Final
 from sdt_tools.errors import RecordingError
 from sdt_tools.frames import Received
 from sdt_tools.recording.container.extents import Extent
-from sdt_tools.recording.container.reader import Damage, McapReader, overlapping
+from sdt_tools.recording.container.reader import Damage, McapReader, RawEntry, overlapping
 from sdt_tools.recording.messages.codec import decode
-from sdt_tools.recording.messages.topics import LIDAR_SCAN, TOPICS, is_ours
+from sdt_tools.recording.messages.topics import LIDAR_SCAN, TOPIC_BY_NAME, TOPICS, Topic, is_ours
 from sdt_tools.recording.series import ScanSeries, joined
 from sdt_tools.recording.session import CONFIG_NAME, SESSION, STATS, derived_id
 from sdt_tools.recording.summary import TopicSummary
@@ -146,6 +147,15 @@ class Recording:
         return read_stamps(self._file, {number: channel.topic for number, channel in self._ours.items()})
 
     @property
+    def foreign_counts(self) -> Mapping[str, int]:
+        """Messages of topics that are passed over, by topic."""
+        counts: Counter[str] = Counter()
+        for number, channel in self._file.channels.items():
+            if number not in self._ours:
+                counts[channel.topic] += self._file.extents[number].count
+        return dict(sorted(counts.items()))
+
+    @property
     def foreign_topics(self) -> tuple[str, ...]:
         """Topics in the file that are passed over."""
         return tuple(sorted({c.topic for number, c in self._file.channels.items() if number not in self._ours}))
@@ -157,10 +167,15 @@ class Recording:
 
         Raises RecordingError for a message that does not parse.
         """
+        for topic, entry in self.entries(topics, start_ns, end_ns):
+            yield Received(entry.log_ns, decode(topic.name, topic.schema, entry.data, entry.publish_ns))
+
+    def entries(
+        self, topics: Collection[str] | None = None, start_ns: int | None = None, end_ns: int | None = None
+    ) -> Iterator[tuple[Topic, RawEntry]]:
+        """The same, not decoded."""
         for entry in self._file.entries(self._numbers(topics), start_ns, end_ns):
-            channel = self._ours[entry.channel_id]
-            schema = self._file.schema_name(channel)
-            yield Received(entry.log_ns, decode(channel.topic, schema, entry.data, entry.publish_ns))
+            yield TOPIC_BY_NAME[self._ours[entry.channel_id].topic], entry
 
     def scans(self) -> ScanSeries:
         """All scans as one series, 4.3 kB a scan, in order of receipt; no scans make an empty series.

@@ -10,7 +10,7 @@ from zlib import crc32
 
 from sdt_tools.recording.container.reader import McapReader, RawEntry
 from sdt_tools.recording.copying import RecordCopy, new_file
-from sdt_tools.recording.editing.latched import Carried, carried_in, place_of
+from sdt_tools.recording.editing.latched import Carried, carried_in, latched_topics, place_of
 from sdt_tools.recording.editing.pauses import pauses_between, recorded, spans_of
 from sdt_tools.recording.editing.plan import Merge
 from sdt_tools.recording.editing.provenance import EditedRecording, original, write_beginning, write_end
@@ -59,6 +59,7 @@ def write_merged(plan: Merge, path: Path) -> EditedRecording:
                 dropped_topics=(),
                 messages=file.counts,
                 carried=frozenset().union(*(own - gone for own, gone in zip(carried, needless, strict=True))),
+                latched_topics=frozenset().union(*map(latched_topics, sources)),
                 shared=shared,
                 interleaved=_overlaps(wholes),
             )

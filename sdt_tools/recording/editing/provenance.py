@@ -8,7 +8,7 @@ from pathlib import Path
 
 from sdt_tools.recording.container.file import McapFile
 from sdt_tools.recording.container.reader import Damage, McapReader
-from sdt_tools.recording.editing.latched import CARRIED, EDIT, Carried, carried_text
+from sdt_tools.recording.editing.latched import CARRIED, EDIT, LATCHED, Carried, carried_text
 from sdt_tools.recording.editing.span import Span, seconds_of
 from sdt_tools.recording.reader import recording_id_of
 from sdt_tools.recording.session import SESSION, SOFTWARE, STATS
@@ -28,7 +28,8 @@ class Original:
 class EditedRecording:
     """A new recording. ``spans`` of its originals are in it; ``messages`` by topic, the ``carried`` among them.
 
-    ``shared`` messages stand in several originals and here once; in ``interleaved`` intervals originals overlap.
+    ``latched_topics`` are those of others whose messages hold on. ``shared`` messages stand in several originals and
+    here once; in ``interleaved`` intervals originals overlap.
     """
 
     out: Path
@@ -39,6 +40,7 @@ class EditedRecording:
     dropped_topics: tuple[str, ...]
     messages: Mapping[str, int]
     carried: frozenset[Carried]
+    latched_topics: frozenset[str] = frozenset()
     shared: int = 0
     interleaved: tuple[Span, ...] = ()
 
@@ -107,6 +109,7 @@ def write_end(file: McapFile, edited: EditedRecording, stats: Mapping[str, str])
             "dropped_topics": json.dumps(edited.dropped_topics),
             "shared": str(edited.shared),
             CARRIED: carried_text(edited.carried),
+            LATCHED: json.dumps(sorted(edited.latched_topics)),
         },
     )
 

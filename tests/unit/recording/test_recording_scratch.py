@@ -4,6 +4,7 @@ import subprocess
 import sys
 import threading
 from collections.abc import Callable
+from contextlib import ExitStack
 from pathlib import Path
 
 import pytest
@@ -20,18 +21,23 @@ from sdt_tools.recording.scratch import give_name, scratch_folder
 def test_two_edits_to_one_output_do_not_touch_each_other(tmp_path: Path) -> None:
     path, out = recorded(tmp_path), tmp_path / "new.mcap"
     first, second = plan_trim(path, "0", "1", out), plan_trim(path, "1", "2", out)
-    with pytest.raises(OutputExistsError, match="exists already"), edit_under_way(first):
-        edit_recordings(second)
-        during = told(out)
+    late = ExitStack()
+    late.enter_context(edit_under_way(first))
+    edit_recordings(second)
+    during = told(out)
+    with pytest.raises(OutputExistsError, match="exists already"):
+        late.close()
     assert told(out) == during
     assert sorted(p.name for p in tmp_path.iterdir()) == ["drive.mcap", "new.mcap"]
 
 
 def test_two_repairs_to_one_output_do_not_touch_each_other(tmp_path: Path) -> None:
     path, out = recorded(tmp_path), tmp_path / "new.mcap"
-    with pytest.raises(OutputExistsError), new_file(out):
-        repair_recording(path, out)
-        assert told(out) == told(path)
+    late = ExitStack()
+    late.enter_context(new_file(out))
+    repair_recording(path, out)
+    with pytest.raises(OutputExistsError):
+        late.close()
     assert told(out) == told(path)
 
 
