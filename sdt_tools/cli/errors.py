@@ -5,7 +5,7 @@ from typing import Annotated
 
 import typer
 
-from sdt_tools.cli.console import JsonFlag, console, emit
+from sdt_tools.cli.console import JsonFlag, console, emit, print_incomplete
 
 
 def command(
@@ -55,4 +55,5 @@ def command(
         console.print(report.note or "no condition was confirmed")
     for warning in report.warnings:
         console.print(f"[yellow]{warning}")
+    print_incomplete(report.incomplete)
     console.print(f"written to {out}", soft_wrap=True)

@@ -7,6 +7,7 @@ from pathlib import Path
 from sdt_tools.clock import SECOND_NS
 from sdt_tools.errors import OutputExistsError
 from sdt_tools.recording.container.reader import Damage
+from sdt_tools.recording.incomplete import Incomplete
 from sdt_tools.recording.reader import Recording
 from sdt_tools.recording.summary import TopicSummary
 from sdt_tools.recording.timing.document import pairs_document, topic_document
@@ -48,6 +49,11 @@ class InspectReport:
     def messages(self) -> int:
         """Messages of all our topics."""
         return sum(topic.count for topic in self.topics.values())
+
+    @property
+    def incomplete(self) -> Incomplete:
+        """What there is to say where it is cut off or damaged."""
+        return Incomplete(self.path, self.truncated, self.start_ns, self.end_ns, self.messages, self.damage)
 
     @property
     def health(self) -> Health:

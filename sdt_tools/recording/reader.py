@@ -43,6 +43,8 @@ class Recording:
         }
         if not self._ours and not self.session:
             self.close()
+            if self.truncated and not channels:
+                raise RecordingError(f"{path}: was cut off before its first topic; nothing can be read of it")
             found = ", ".join(sorted({channel.topic for channel in channels.values()})) or "no topics at all"
             raise RecordingError(
                 f"{path}: holds none of our topics ({', '.join(topic.name for topic in TOPICS[:2])} …) in our schemas; "

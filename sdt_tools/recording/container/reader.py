@@ -43,6 +43,13 @@ class Damage:
     end_ns: int
     reason: str
 
+    @property
+    def text(self) -> str:
+        """The same for people; what costs no message has no interval."""
+        if not self.end_ns:
+            return self.reason
+        return f"lost from {self.start_ns} to {self.end_ns} ns: {self.reason}"
+
 
 class RawEntry(NamedTuple):
     """A message as it lies in the file. Entries sort by log time, then by their place in the file."""

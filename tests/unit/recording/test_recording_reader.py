@@ -304,7 +304,7 @@ def bad_magic_alone(path: Path) -> Path:
         (bad_empty, "is empty; nothing was recorded"),
         (bad_folder, r"is a folder; name the \.mcap file in it"),
         (bad_topics, r"holds none of our topics .*; it has /chatter; check that it is a recording"),
-        (bad_magic_alone, "holds none of our topics .*; it has no topics at all"),
+        (bad_magic_alone, "was cut off before its first topic; nothing can be read of it"),
     ],
 )
 def test_what_is_no_recording_is_refused_in_one_line(tmp_path: Path, make, message: str) -> None:
