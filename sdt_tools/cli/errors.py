@@ -6,9 +6,22 @@ from typing import Annotated
 import typer
 
 from sdt_tools.cli.console import JsonFlag, console, emit, print_incomplete
+from sdt_tools.cli.default_command import WithDefault
+
+app = typer.Typer(
+    cls=WithDefault,
+    no_args_is_help=True,
+    help="Say of every wrong frame why it is wrong. Without a sub-command named: analyse.",
+)
 
 
-def command(
+@app.callback()
+def errors() -> None:
+    """Say of every wrong frame why it is wrong. Without a sub-command named: analyse."""
+
+
+@app.command("analyse")
+def analyse(
     predictions: Annotated[Path, typer.Argument(metavar="PREDICTIONS", help="File that sdt replay made, with labels.")],
     recordings: Annotated[
         list[Path],

@@ -9,10 +9,10 @@ from typing import Final
 
 from sdt_tools.error_analysis.definitions import ErrorOptions
 from sdt_tools.error_analysis.explain import explain
-from sdt_tools.error_analysis.figures import draw_epsilon, draw_tags
 from sdt_tools.error_analysis.labelled import load_labelled
 from sdt_tools.error_analysis.recorded import find_recordings, read_situations
-from sdt_tools.error_analysis.report import ErrorReport, summarise, tag_table
+from sdt_tools.error_analysis.report.document import ErrorReport, summarise, tag_table
+from sdt_tools.error_analysis.report.figures import draw_epsilon, draw_tags
 from sdt_tools.errors import OutputExistsError
 from sdt_tools.runs.code import code_version
 from sdt_tools.runs.local import Progress

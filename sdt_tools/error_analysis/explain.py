@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float32
 
-from sdt_tools.error_analysis.conditions import ConditionSearch, find_conditions
+from sdt_tools.error_analysis.conditions.search import ConditionSearch, find_conditions
 from sdt_tools.error_analysis.definitions import ErrorOptions
 from sdt_tools.error_analysis.distance import Epsilon, estimate_epsilon
 from sdt_tools.error_analysis.labelled import LabelledFrames

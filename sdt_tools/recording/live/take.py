@@ -69,11 +69,6 @@ class Take:
         return self.start_ns + self._length_ns + self._paused_ns
 
     @property
-    def space(self) -> DiskSpace | None:
-        """Room on the disk, where it is watched."""
-        return self.sink.space
-
-    @property
     def disk_is_full(self) -> bool:
         """Whether the recording has to end for want of room."""
         return self.sink.space is not None and self.sink.space.full

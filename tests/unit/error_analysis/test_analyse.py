@@ -13,7 +13,7 @@ from sdt_tools.error_analysis.definitions import ErrorOptions, Tag
 from sdt_tools.error_analysis.explain import explain
 from sdt_tools.error_analysis.labelled import load_labelled
 from sdt_tools.error_analysis.recorded import find_recordings, read_situations
-from sdt_tools.error_analysis.report import ErrorReport, summarise
+from sdt_tools.error_analysis.report.document import ErrorReport, summarise
 from sdt_tools.errors import ConfigError, OutputExistsError, RecordingError, UsageError
 from sdt_tools.replay.replay import replay
 

@@ -3,7 +3,7 @@ import polars as pl
 import pytest
 from planted import OPTIONS, Planted, autoregressive, drives, plant, table, with_errors
 
-from sdt_tools.error_analysis.conditions import find_conditions
+from sdt_tools.error_analysis.conditions.search import find_conditions
 from sdt_tools.error_analysis.definitions import ErrorOptions, Tag
 from sdt_tools.error_analysis.explain import explain
 from sdt_tools.error_analysis.neighbours import build_index

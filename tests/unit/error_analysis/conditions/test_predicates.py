@@ -4,7 +4,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from sdt_tools.error_analysis.predicates import Condition, Predicate, features_of, simplest_between
+from sdt_tools.error_analysis.conditions.predicates import Condition, Predicate, features_of, simplest_between
 from sdt_tools.errors import UsageError
 
 TABLE = pl.DataFrame(

@@ -12,8 +12,8 @@ import numpy as np
 from jaxtyping import Bool, Float64, Int64
 from numba import njit
 
+from sdt_tools.error_analysis.conditions.predicates import Condition
 from sdt_tools.error_analysis.definitions import ConditionOptions, is_conditional
-from sdt_tools.error_analysis.predicates import Condition
 
 MIN_FRAMES = 20
 """Fewest frames inside a condition for a mean that says anything."""

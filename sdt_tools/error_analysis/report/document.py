@@ -7,7 +7,7 @@ from typing import Final
 import numpy as np
 import polars as pl
 
-from sdt_tools.error_analysis.confirmation import Verdict
+from sdt_tools.error_analysis.conditions.confirmation import Verdict
 from sdt_tools.error_analysis.definitions import ErrorOptions, Tag
 from sdt_tools.error_analysis.distance import Epsilon
 from sdt_tools.error_analysis.explain import Explanation

@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 
 from sdt_tools.error_analysis.definitions import Tag
 from sdt_tools.error_analysis.distance import Epsilon
-from sdt_tools.error_analysis.report import ErrorReport
+from sdt_tools.error_analysis.report.document import ErrorReport
 
 TAG_COLOURS: Final = {
     Tag.SYSTEMATIC: "#d81b82",

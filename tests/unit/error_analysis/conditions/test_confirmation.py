@@ -3,9 +3,9 @@ from itertools import permutations, product
 import numpy as np
 import pytest
 
-from sdt_tools.error_analysis.confirmation import Recordings, confirm, holm, permutation_p
+from sdt_tools.error_analysis.conditions.confirmation import Recordings, confirm, holm, permutation_p
+from sdt_tools.error_analysis.conditions.predicates import Condition, Predicate
 from sdt_tools.error_analysis.definitions import ConditionOptions
-from sdt_tools.error_analysis.predicates import Condition, Predicate
 
 CONDITION = Condition((Predicate("range_m", "<", 1.0),))
 OPTIONS = ConditionOptions()

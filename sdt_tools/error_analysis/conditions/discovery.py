@@ -12,8 +12,8 @@ from itertools import combinations_with_replacement
 import numpy as np
 from jaxtyping import Bool, Float64, Int64
 
+from sdt_tools.error_analysis.conditions.predicates import Condition, Features, Predicate, simplest_between
 from sdt_tools.error_analysis.definitions import ConditionOptions
-from sdt_tools.error_analysis.predicates import Condition, Features, Predicate, simplest_between
 
 BLOCK_FRAMES = 65_536
 """Frames whose predicates are held in memory at a time."""

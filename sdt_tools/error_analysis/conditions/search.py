@@ -5,11 +5,11 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Bool, Int64
 
-from sdt_tools.error_analysis.confirmation import Recordings, Verdict, confirm
+from sdt_tools.error_analysis.conditions.confirmation import Recordings, Verdict, confirm
+from sdt_tools.error_analysis.conditions.discovery import Scope, discover
+from sdt_tools.error_analysis.conditions.predicates import features_of
 from sdt_tools.error_analysis.definitions import ErrorOptions
-from sdt_tools.error_analysis.discovery import Scope, discover
 from sdt_tools.error_analysis.labelled import LabelledFrames
-from sdt_tools.error_analysis.predicates import features_of
 
 
 @dataclass(frozen=True, eq=False)

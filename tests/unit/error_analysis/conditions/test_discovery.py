@@ -5,9 +5,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from sdt_tools.error_analysis.conditions.discovery import Scope, discover, log_likelihood_ratio
+from sdt_tools.error_analysis.conditions.predicates import Features
 from sdt_tools.error_analysis.definitions import ConditionOptions
-from sdt_tools.error_analysis.discovery import Scope, discover, log_likelihood_ratio
-from sdt_tools.error_analysis.predicates import Features
 
 FRAMES = 6000
 

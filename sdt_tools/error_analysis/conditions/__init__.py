@@ -1,0 +1,1 @@
+"""Conditions that errors gather in: found on some recordings, confirmed on others."""

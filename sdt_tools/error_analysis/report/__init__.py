@@ -1,0 +1,1 @@
+"""What an analysis says: one document, a table of tags, figures."""
