@@ -9,6 +9,8 @@ from typing import Final
 from sdt_tools.errors import RecordingError
 from sdt_tools.recording.container.reader import Damage, McapReader
 from sdt_tools.recording.copying import RecordCopy, new_file
+from sdt_tools.recording.messages.topics import is_ours
+from sdt_tools.recording.reader import decoded
 from sdt_tools.recording.session import STATS
 from sdt_tools.recording.timing.pauses import pauses_in
 from sdt_tools.recording.timing.summary import ENTRY
@@ -68,7 +70,14 @@ def repair_recording(path: Path, out: Path) -> RepairReport:
                 file.add_metadata(record.name, record.metadata)
         for channel in source.channels.values():
             copy.announce(source, channel)
+        ours = frozenset(
+            number
+            for number, channel in source.channels.items()
+            if is_ours(channel.topic, source.schema_name(channel), channel.message_encoding)
+        )
         for entry in source.entries():
+            if entry.channel_id in ours and not source.is_checked(entry.offset) and decoded(source, entry) is None:
+                continue  # in the new file a checksum would vouch for it
             copy.take(source, entry)
         file.finish_chunks()
         messages = file.counts

@@ -32,16 +32,17 @@ class Carried(NamedTuple):
 
 
 def outgoing(recording: Recording) -> Iterator[Carried]:
-    """All messages of ``recording`` in order of receipt; RecordingError for one that does not parse, or for none."""
+    """All messages of ``recording`` in order of receipt; one that does not parse stays behind, named in ``damage``.
+
+    Raises RecordingError where there are none.
+    """
     empty = True
     for topic, entry in recording.entries():
         try:
             message = message_class(topic.schema).FromString(entry.data)
         except DecodeError:
-            raise RecordingError(
-                f"{recording.path}: {topic.name} at {entry.publish_ns} ns: not a valid {topic.schema}; "
-                "the data is damaged, `sdt repair` saves the rest"
-            ) from None
+            recording.lose(topic, entry)
+            continue
         empty = False
         yield Carried(topic, entry.log_ns, entry.publish_ns, message)
     if empty:

@@ -12,6 +12,7 @@ from sdt_tools.errors import RunError
 from sdt_tools.protocols import Driver, Observer
 from sdt_tools.recording.live.control import Control
 from sdt_tools.recording.live.decide import Deciders, DecisionLoop
+from sdt_tools.recording.live.encoder import PictureEncoder
 from sdt_tools.recording.live.interrupt import Interrupt, deferred_interrupt
 from sdt_tools.recording.live.keep_last import KeepLast
 from sdt_tools.recording.live.loop import LiveLoop
@@ -121,8 +122,9 @@ def _play_world(
     def tally() -> Tally:
         return Tally(decisions.decisions, decisions.forced, pace.missed + decisions.missed)
 
-    recorder.begin(start_ns, open_writer, tally)
-    loop = LiveLoop(source, source, decisions, pace, observers, recorder, progress)
+    encoder = PictureEncoder(behind=config.realtime)
+    loop = LiveLoop(source, source, decisions, pace, observers, recorder, progress, encoder)
+    recorder.begin(start_ns, open_writer, tally, loop.settle)
     try:
         return loop.run(interrupt)
     finally:

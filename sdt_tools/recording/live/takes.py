@@ -65,8 +65,14 @@ class TakeRecorder:
         self._marks = 0
         self._began_ns = 0
 
-    def begin(self, start_ns: int, open_writer: OpenWriter, tally: Callable[[], Tally]) -> None:
-        """A source starts at ``start_ns``; its takes are opened by ``open_writer``."""
+    def begin(
+        self, start_ns: int, open_writer: OpenWriter, tally: Callable[[], Tally], settle: Callable[[], None]
+    ) -> None:
+        """A source starts at ``start_ns``; its takes are opened by ``open_writer``.
+
+        ``settle`` has all that was received so far recorded, pictures that are being encoded too.
+        """
+        self._settle = settle
         self._open_writer = open_writer
         self._tally = tally
         self._latched = Latched()
@@ -112,9 +118,14 @@ class TakeRecorder:
         if self._running is not None:
             self._running.take.write(received)
 
-    def missing(self, received: Received) -> int:
+    def drop(self, topic: str, received_ns: int) -> None:
         """From the take that runs."""
-        return 0 if self._running is None else self._running.take.missing(received)
+        if self._running is not None:
+            self._running.take.drop(topic, received_ns)
+
+    def missing(self, topic: str, stamp_ns: int) -> int:
+        """From the take that runs."""
+        return 0 if self._running is None else self._running.take.missing(topic, stamp_ns)
 
     def tick(self, now_ns: int) -> Iterator[LogEntry]:
         """Do what is wanted, save the ring where something has happened, watch writer and disk."""
@@ -156,6 +167,7 @@ class TakeRecorder:
 
     def _do(self, act: Act, now_ns: int) -> Iterator[LogEntry]:
         """One wish. An entry is recorded before this goes on, which is why a pause is told before it begins."""
+        self._settle()  # what was received before the wish belongs to what was before it
         running = self._running
         wish = act.wish
         if wish is Wish.TOGGLE:
