@@ -1,11 +1,13 @@
 """A terminal app that says when its terminal is too small, and works as soon as it is large enough."""
 
+from collections.abc import Iterable
 from typing import ClassVar, Generic, TypeVar
 
 from textual import events
-from textual.app import App, ComposeResult
+from textual.app import App
 from textual.binding import BindingType
 from textual.screen import ModalScreen
+from textual.widget import Widget
 from textual.widgets import Static
 
 ResultT = TypeVar("ResultT")
@@ -23,7 +25,7 @@ class TooSmall(ModalScreen[None]):
         super().__init__()
         self._least = least
 
-    def compose(self) -> ComposeResult:
+    def compose(self) -> Iterable[Widget]:
         """One sentence."""
         yield Static(self._words(), markup=False)
 

@@ -90,7 +90,7 @@ def draw_pixels(rgb: UInt8[np.ndarray, "rows columns 3"]) -> list[Strip]:
 def line(width: int, height: int, points: Float[np.ndarray, "corners 2"]) -> Float[np.ndarray, "dots 2"]:
     """Dots along a polyline given in cells, those within ``width`` by ``height``."""
     starts, ends = points[:-1], points[1:]
-    steps = np.maximum(np.ceil(np.abs((ends - starts) * (2, 4)).max(axis=1)), 1).astype(np.int64)
+    steps = 1 + np.ceil(2 * np.abs((ends - starts) * (2, 4)).max(axis=1)).astype(np.int64)  # two a dot: no gaps
     steps = np.minimum(steps, 8 * (width + height))
     parts = [
         start + (end - start) * np.linspace(0.0, 1.0, count + 1)[:, None]

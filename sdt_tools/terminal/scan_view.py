@@ -1,5 +1,7 @@
 """A scan from above in a terminal: ahead is up, left is left, a metre is as long in every direction."""
 
+from dataclasses import dataclass
+from functools import lru_cache
 from typing import Final
 
 import numpy as np
@@ -35,6 +37,7 @@ ROBOT: Final[Rgb] = (225, 230, 238)
 RING: Final[Rgb] = (62, 68, 80)
 QUIET: Final[Rgb] = (120, 128, 142)
 NEAR_M: Final = 0.5
+_MOUNT: Final = Mount()
 
 
 def draw_scan(
@@ -45,32 +48,49 @@ def draw_scan(
     Rings stand at whole metres, or at more where there would be many. Hits nearer than half a metre are yellow, the
     safety zone is red.
     """
-    rows_a_metre = AHEAD_SHARE * height / reach_m
-
-    def cells(points_lidar: Float64[np.ndarray, "points 2"]) -> Float64[np.ndarray, "points 2"]:
-        seen = to_screen(points_lidar).astype(np.float64) * (2.0 * rows_a_metre, rows_a_metre)
-        at: Float64[np.ndarray, "points 2"] = seen + np.array([width / 2, AHEAD_SHARE * height])
-        return at
-
-    def drawn(points_lidar: Float64[np.ndarray, "points 2"]) -> Float64[np.ndarray, "dots 2"]:
-        return line(width, height, cells(points_lidar))
-
-    apart_m = next(step for step in (0.5, 1.0, 2.0, 5.0) if reach_m / step <= 4.0)
-    radii_m = [apart_m * number for number in range(1, int(reach_m / apart_m) + 1)]
-    layers = [Dots(drawn(arc(radius_m, -2.36, 2.36))[::2], RING) for radius_m in radii_m]
-    words = [_ring_words(radius_m, cells(np.array([[0.0, -radius_m]]))[0]) for radius_m in radii_m]
-    mount = Mount()
-    layers += [Dots(drawn(base_to_lidar(shape, mount)), ROBOT) for shape in footprint_base()]
-    layers.append(Dots(drawn(safety_zone_lidar()), ZONE))
+    place = _Place(width, height, reach_m)
+    furniture, words = _furniture(place)
+    layers = list(furniture)
     if motion is not None:
         twist, color = motion
-        layers += [Dots(drawn(base_to_lidar(shape, mount)), color) for shape in motion_base(twist)]
+        layers += [Dots(place.drawn(base_to_lidar(shape, _MOUNT)), color) for shape in motion_base(twist)]
     ranges_m = scan.ranges_m[None]
     hit = distances(ranges_m)[0]
     near = hit & (scan.ranges_m < NEAR_M)
     points_lidar = hits_lidar(np.where(hit, scan.ranges_m, 0.0)[None])[0]
-    layers += [Dots(cells(points_lidar[hit & ~near]), HIT), Dots(cells(points_lidar[near]), NEAR)]
+    layers += [Dots(place.cells(points_lidar[hit & ~near]), HIT), Dots(place.cells(points_lidar[near]), NEAR)]
     return draw_dots(layers, words, width, height)
+
+
+@dataclass(frozen=True)
+class _Place:
+    """From the LiDAR's frame to cells."""
+
+    width: int
+    height: int
+    reach_m: float
+
+    def cells(self, points_lidar: Float64[np.ndarray, "points 2"]) -> Float64[np.ndarray, "points 2"]:
+        """Where points are drawn."""
+        rows_a_metre = AHEAD_SHARE * self.height / self.reach_m
+        seen = to_screen(points_lidar).astype(np.float64) * (2.0 * rows_a_metre, rows_a_metre)
+        at: Float64[np.ndarray, "points 2"] = seen + np.array([self.width / 2, AHEAD_SHARE * self.height])
+        return at
+
+    def drawn(self, points_lidar: Float64[np.ndarray, "points 2"]) -> Float64[np.ndarray, "dots 2"]:
+        """The dots of a polyline."""
+        return line(self.width, self.height, self.cells(points_lidar))
+
+
+@lru_cache(maxsize=8)
+def _furniture(place: _Place) -> tuple[tuple[Dots, ...], tuple[Words, ...]]:
+    """What is the same in every scan: rings, robot, safety zone."""
+    apart_m = next(step for step in (0.5, 1.0, 2.0, 5.0) if place.reach_m / step <= 4.0)
+    radii_m = [apart_m * number for number in range(1, int(place.reach_m / apart_m) + 1)]
+    rings = [Dots(place.drawn(arc(radius_m, -2.36, 2.36))[::4], RING) for radius_m in radii_m]
+    words = [_ring_words(radius_m, place.cells(np.array([[0.0, -radius_m]]))[0]) for radius_m in radii_m]
+    robot = [Dots(place.drawn(base_to_lidar(shape, _MOUNT)), ROBOT) for shape in footprint_base()]
+    return (*rings, *robot, Dots(place.drawn(safety_zone_lidar()), ZONE)), tuple(words)
 
 
 def _ring_words(radius_m: float, beside: Float64[np.ndarray, "2"]) -> Words:

@@ -1,7 +1,10 @@
 """Rerun beside a terminal app: the frame that the app shows, at the same stamp on Rerun's timeline."""
 
+import time
 from collections.abc import Sequence
+from typing import Final
 
+import numpy as np
 from rerun.experimental import ViewerClient
 
 from sdt_tools.errors import RunError
@@ -10,12 +13,14 @@ from sdt_tools.view.observer import RerunObserver
 from sdt_tools.view.timeline import TIME
 from sdt_tools.view.viewer import open_window, viewer_url
 
+ARRIVAL_S: Final = 2.0
+
 
 class RerunBeside:
     """Shows frames in a viewer, in whatever order they come, and moves its time to each."""
 
     def __init__(self, port: int) -> None:
-        self._observer = RerunObserver.to_viewer(viewer_url(port))
+        self._observer = RerunObserver.to_viewer(viewer_url(port), period_ns=0)
         self._client = ViewerClient.connect(viewer_url(port))
         self._seen: set[int] = set()
 
@@ -30,10 +35,20 @@ class RerunBeside:
             self._seen.add(stamp_ns)
             for received in messages:
                 self._observer.observe(received)
+            self._observer.flush()
+        end_s = time.monotonic() + ARRIVAL_S
+        while not self._is_gone_to(stamp_ns):
+            if time.monotonic() > end_s:
+                raise RunError("the viewer does not answer; labeling goes on without it")
+            time.sleep(0.02)
+
+    def _is_gone_to(self, stamp_ns: int) -> bool:
+        """Whether the viewer's time is moved; it is not before the first of the data has arrived."""
         try:
-            self._client.set_time(TIME, timestamp=stamp_ns / 1e9, play_state="paused")
+            self._client.set_time(TIME, timestamp=np.datetime64(stamp_ns, "ns"), play_state="paused")
         except (RuntimeError, OSError):
-            raise RunError("the viewer is gone; labeling goes on without it") from None
+            return False
+        return True
 
     def close(self) -> None:
         """The app has ended; the viewer stays."""

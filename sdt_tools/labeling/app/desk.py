@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from types import TracebackType
-from typing import Protocol
+from typing import Protocol, runtime_checkable
 
 import numpy as np
 import polars as pl
@@ -41,6 +41,7 @@ class Task:
     suspects: Path | None = None
 
 
+@runtime_checkable
 class Beside(Protocol):
     """Something beside the terminal that shows the same frame."""
 

@@ -1,15 +1,16 @@
 """What opens over the app: where to go, what is in doubt, which keys there are. Esc closes each."""
 
+from collections.abc import Iterable
 from typing import ClassVar, Final
 
 import numpy as np
 from rich.style import Style
 from rich.text import Text
 from textual import on
-from textual.app import ComposeResult
 from textual.binding import BindingType
 from textual.containers import Horizontal, Vertical
 from textual.screen import ModalScreen
+from textual.widget import Widget
 from textual.widgets import Input, OptionList, Static
 from textual.widgets.option_list import Option
 
@@ -39,7 +40,7 @@ class JumpDialog(ModalScreen[int | None]):
         super().__init__()
         self._state = state
 
-    def compose(self) -> ComposeResult:
+    def compose(self) -> Iterable[Widget]:
         """A line to type in."""
         with Vertical():
             yield Static("Go to 12.5 or 1:02.5 · +3 or -3 seconds · #120 · 50%", markup=False)
@@ -58,7 +59,10 @@ class JumpDialog(ModalScreen[int | None]):
 class ReviewDialog(ModalScreen[ReviewItem | None]):
     """Lists what is in doubt, the gravest first; gives what is chosen."""
 
-    CSS = _FRAME.format("ReviewDialog", "92%", "80%") + "ReviewDialog OptionList { height: 1fr; border: none; }"
+    CSS = (
+        _FRAME.format("ReviewDialog", "92%", "80%")
+        + "ReviewDialog OptionList { height: 1fr; border: none; background: #1a1e28; }"
+    )
     BINDINGS: ClassVar[list[BindingType]] = [("escape", "dismiss"), ("l", "dismiss")]
     MOST: Final = 1000
 
@@ -68,7 +72,7 @@ class ReviewDialog(ModalScreen[ReviewItem | None]):
         self._stamps_ns = state.labels.stamps_ns
         self.items = review_queue(state.labels, state.prelabels, state.suspects)
 
-    def compose(self) -> ComposeResult:
+    def compose(self) -> Iterable[Widget]:
         """A line an item."""
         with Vertical():
             yield Static(self._title(), markup=False)
@@ -83,7 +87,7 @@ class ReviewDialog(ModalScreen[ReviewItem | None]):
         if not self.items:
             return "nothing is in doubt · Esc closes"
         beyond = f", of which the first {self.MOST:,}" if len(self.items) > self.MOST else ""
-        return f"{len(self.items):,} in doubt{beyond} · ! people · ? suspect · ≠ pre-label · Enter chooses the frames"
+        return f"{len(self.items):,} in doubt{beyond} · ! people ? suspect ≠ pre-label · Enter chooses"
 
     def _line(self, item: ReviewItem) -> Text:
         sign, color = _SIGNS[item.doubt]
@@ -96,7 +100,7 @@ class HelpDialog(ModalScreen[None]):
     """All keys."""
 
     CSS = f"""
-    {_FRAME.format("HelpDialog", "80", "auto")}
+    {_FRAME.format("HelpDialog", "78", "auto")}
     HelpDialog Static {{ width: 1fr; }}
     HelpDialog Horizontal {{ height: auto; }}
     """
@@ -106,9 +110,9 @@ class HelpDialog(ModalScreen[None]):
         super().__init__()
         self._kind = kind
 
-    def compose(self) -> ComposeResult:
+    def compose(self) -> Iterable[Widget]:
         """Two columns."""
-        labels = Text("Classes\n", Style(bold=True))
+        labels = Text().append("Classes\n", Style(bold=True))
         for name, (digit, letter) in zip(self._kind.classes, class_keys(self._kind), strict=True):
             labels.append(f"{digit} {letter}".ljust(10), style_of(BRIGHT)).append(f"{name}\n", style_of(DIM))
         with Vertical(), Horizontal():
@@ -118,8 +122,10 @@ class HelpDialog(ModalScreen[None]):
 
 def group(name: str) -> Text:
     """The keys of a group, a line each."""
-    text = Text(f"{name}\n", Style(bold=True))
+    text = Text().append(f"{name}\n", Style(bold=True))
     for key in GROUPS[name]:
+        if not key.shown:
+            continue
         text.append(key.shown.ljust(10), style_of(BRIGHT)).append(f"{key.does}\n", style_of(DIM))
     return text
 

@@ -8,7 +8,10 @@ from sdt_tools.labeling.vocabulary import LabelKind
 
 @dataclass(frozen=True)
 class Key:
-    """``names`` are the keys as the terminal tells them; ``shown`` what is on the keyboard; ``action`` what they do."""
+    """``names`` are the keys as the terminal tells them; ``shown`` what is on the keyboard; ``action`` what they do.
+
+    Where nothing is ``shown``, the line of the key before says it.
+    """
 
     names: tuple[str, ...]
     shown: str
@@ -18,40 +21,40 @@ class Key:
 
 GROUPS: Final[dict[str, tuple[Key, ...]]] = {
     "Go": (
-        Key(("right", "."), "→ .", "step(1)", "a frame on"),
-        Key(("left", ","), "← ,", "step(-1)", "a frame back"),
-        Key(("shift+right", "pagedown"), "⇧→ PgDn", "step(10)", "ten frames on"),
-        Key(("shift+left", "pageup"), "⇧← PgUp", "step(-10)", "ten frames back"),
-        Key(("home",), "Home", "first", "the first frame"),
-        Key(("end",), "End", "last", "the last frame"),
-        Key(("n",), "n", "unlabelled", "next frame without your label"),
-        Key(("N",), "N", "unlabelled_before", "the one before"),
-        Key(("j",), "j", "disagreement", "next disagreement"),
-        Key(("J",), "J", "disagreement_before", "the one before"),
-        Key(("k",), "k", "suspect", "next suspect label"),
-        Key(("K",), "K", "suspect_before", "the one before"),
-        Key(("l",), "l", "review", "list of all that is in doubt"),
+        Key(("right", "."), "→ ← . ,", "step(1)", "a frame on, back"),
+        Key(("left", ","), "", "step(-1)", ""),
+        Key(("shift+right", "pagedown"), "PgDn PgUp", "step(10)", "ten frames on, back"),
+        Key(("shift+left", "pageup"), "⇧→ ⇧←", "step(-10)", "the same"),
+        Key(("home",), "Home End", "first", "first frame, last"),
+        Key(("end",), "", "last", ""),
+        Key(("n",), "n N", "unlabelled", "next unlabelled, previous"),
+        Key(("N",), "", "unlabelled_before", ""),
+        Key(("j",), "j J", "disagreement", "next disagreement, previous"),
+        Key(("J",), "", "disagreement_before", ""),
+        Key(("k",), "k K", "suspect", "next suspect, previous"),
+        Key(("K",), "", "suspect_before", ""),
+        Key(("l",), "l", "review", "list all that is in doubt"),
         Key(("g",), "g", "jump", "go to a time or frame"),
         Key(("space",), "Space", "play", "play, stop"),
-        Key(("o",), "o", "play_slowly", "play at a quarter of the speed"),
-        Key(("+",), "+", "faster", "play faster"),
-        Key(("-",), "-", "slower", "play slower"),
+        Key(("o",), "o", "play_slowly", "play slowly"),
+        Key(("+",), "+ -", "faster", "play faster, slower"),
+        Key(("-",), "", "slower", ""),
     ),
     "Label": (
         Key(("0", "backspace", "delete"), "0 ⌫", "withdraw", "withdraw the label"),
         Key(("v",), "v", "range", "begin a range, give it up"),
-        Key(("f",), "f", "carry", "carry forward while you go on"),
+        Key(("f",), "f", "carry", "carry forward as you go"),
         Key(("a",), "a", "accept", "accept the pre-label"),
-        Key(("=",), "=", "settle", "settle what people disagree about"),
+        Key(("=",), "=", "settle", "settle a disagreement"),
         Key(("u", "ctrl+z"), "u ^z", "undo", "undo"),
         Key(("r", "ctrl+y"), "r ^y", "redo", "do again"),
-        Key(("escape",), "Esc", "let_go", "give up range, settling, playing"),
+        Key(("escape",), "Esc", "let_go", "give up what was begun"),
     ),
     "See": (
-        Key(("[",), "[", "zoom(-1)", "nearer"),
-        Key(("]",), "]", "zoom(1)", "further"),
+        Key(("[",), "[ ]", "zoom(-1)", "nearer, further"),
+        Key(("]",), "", "zoom(1)", ""),
         Key(("?",), "?", "help", "these keys"),
-        Key(("ctrl+q", "ctrl+c"), "^q ^c", "quit", "quit; all is on disk already"),
+        Key(("ctrl+q", "ctrl+c"), "^q ^c", "quit", "quit; all is on disk"),
     ),
 }
 """What keys do, but for those that give a class."""

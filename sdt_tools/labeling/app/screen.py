@@ -1,17 +1,17 @@
 """The labeling app's screen: each key leads to a turn, the turn is written, then it is shown."""
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import replace
 from typing import ClassVar, Final
 
 import numpy as np
 from rich.text import Text
 from textual import events
-from textual.app import ComposeResult
 from textual.binding import BindingType
 from textual.containers import Container
 from textual.screen import Screen
+from textual.widget import Widget
 from textual.widgets import Static
 
 from sdt_tools.clock import SECOND_NS
@@ -52,10 +52,10 @@ class LabelingScreen(Screen[None]):
     #main { layout: grid; grid-size: 3 2; grid-columns: 1fr 24 28; grid-rows: 9 1fr; height: 1fr; }
     #scan { row-span: 2; }
     #classes { row-span: 2; }
-    .wide #main { grid-columns: 3fr 30 2fr; grid-rows: 1fr 14; grid-gutter: 0 1; }
-    .wide #picture { column-span: 2; }
-    .wide #classes { row-span: 1; }
-    .wide #said { row-span: 1; }
+    #classes, #said { height: 100%; }
+    LabelingScreen.wide #main { grid-columns: 1fr 34 1fr; grid-rows: 1fr 13; grid-gutter: 0 1; }
+    LabelingScreen.wide #picture { column-span: 2; }
+    LabelingScreen.wide #classes { row-span: 1; }
     """
 
     def __init__(self, desk: Desk, beside: Beside | None = None, now_ns: Callable[[], int] = time.time_ns) -> None:
@@ -68,7 +68,7 @@ class LabelingScreen(Screen[None]):
         self._playing_ns = 0.0
         self._alarm = False
 
-    def compose(self) -> ComposeResult:
+    def compose(self) -> Iterable[Widget]:
         """Heading, the frame and what is said of it, the recording in time, a message, keys."""
         yield Static(id="heading", classes="line", markup=False)
         with Container(id="main"):

@@ -14,7 +14,7 @@ from sdt_tools.labeling.review import is_open
 from sdt_tools.labeling.vocabulary import LabelSource
 from sdt_tools.terminal.raster import BLANK, style
 
-HINTS: Final = " ? keys  ←→ go  n unlabelled  j differing  v range  f carry  u undo  Space play"
+HINTS: Final[str] = " ? keys  ←→ go  n unlabelled  j differing  v range  f carry  u undo  Space play"
 COUNT_CELLS: Final = 7
 _ON: Final = Style(bold=True)
 
@@ -36,6 +36,8 @@ def heading(state: State, name: str, width: int) -> Text:
     for text, color in _flags(state):
         flags.append(f" {text} ", style(BLANK, color, bold=True)).append(" ")
     left = Text(f" {state.labels.kind}  ", style(DIM)).append(state.labeler, _ON).append("  ").append_text(flags)
+    if width - len(place) - left.cell_len - 2 < len(name):
+        place = f"{state.cursor + 1:,}/{len(stamps_ns):,}  {at} "
     room = width - len(place) - left.cell_len - 2
     title = name if len(name) <= room else f"…{name[-max(room - 1, 0) :]}" if room > 1 else ""
     line = Text(f" {title}", style(BRIGHT)).append_text(left)
@@ -107,7 +109,7 @@ def frame_words(state: State) -> Text:
     if state.predicted is not None:
         said("model", int(state.predicted[row]), " (pre)")
     if state.labels.disputed[row]:
-        text.append(" people disagree: = settles\n", style(CONFLICT))
+        text.append(" ! differing: = settles\n", style(CONFLICT))
     for one in state.suspects:
         if one.row == row and is_open(one, state.labels):
             text.append(f" ? {one.score:.2f} rather {one.suggested}\n", style(SUSPECT))

@@ -94,11 +94,6 @@ def read_segment(view: memoryview, segment: Segment) -> bytes | memoryview:
     return data
 
 
-def is_checked(view: memoryview, offset: int) -> bool:
-    """Whether the segment at ``offset`` is a chunk with a checksum, not a run of messages."""
-    return view[offset] != Opcode.MESSAGE and _CHUNK_HEAD.unpack_from(view, offset)[5] != 0
-
-
 def stored(view: memoryview, segment: Segment) -> memoryview | None:
     """What ``segment`` holds, where it lies in the file uncompressed; not held against a checksum. Else None."""
     end = segment.offset + segment.length
@@ -110,6 +105,11 @@ def stored(view: memoryview, segment: Segment) -> memoryview | None:
     compressed = _CHUNK_HEAD.unpack_from(view, segment.offset)[6]
     (length,) = struct.unpack_from("<Q", view, head)
     return None if compressed or head + 8 + length > end else view[head + 8 : head + 8 + length]
+
+
+def is_checked(view: memoryview, offset: int) -> bool:
+    """Whether the segment at ``offset`` is a chunk with a checksum, not a run of messages."""
+    return view[offset] != Opcode.MESSAGE and _CHUNK_HEAD.unpack_from(view, offset)[5] != 0
 
 
 def ends_within_a_record(view: memoryview, segment: Segment, data: bytes | memoryview) -> bool:

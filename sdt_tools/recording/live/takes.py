@@ -18,7 +18,7 @@ from sdt_tools.recording.live.latched import Latched
 from sdt_tools.recording.live.outcome import Ending, RecordingProgress
 from sdt_tools.recording.live.session_folder import SessionFolder
 from sdt_tools.recording.live.sink import DirectSink, QueuedSink
-from sdt_tools.recording.live.take import Take, Tally, stats_of
+from sdt_tools.recording.live.take import Take, Tally
 from sdt_tools.recording.writer import RecordingWriter
 
 _LISTEN_S: Final = 0.05
@@ -140,8 +140,7 @@ class TakeRecorder:
         self._clerk.check()
         if self._running is not None:
             yield from self._running.take.watch(now_ns)
-            space = self._running.take.space
-            if space is not None and space.full:
+            if self._running.take.disk_is_full:
                 self.ending = Ending.DISK
         for act in self._control.heard() if self._control is not None else ():
             yield from self._do(act, now_ns)
@@ -159,7 +158,7 @@ class TakeRecorder:
     def last_words(self, now_ns: int) -> Iterator[LogEntry]:
         """Drops that are not told yet."""
         if self._running is not None:
-            yield from self._running.take.sink.bursts(now_ns, at_end=True)
+            yield from self._running.take.last_words(now_ns)
 
     def end(self, ending: Ending, now_ns: int) -> None:
         """The source is through: the running take ends, and the ring is saved where it is due."""
@@ -227,15 +226,13 @@ class TakeRecorder:
             self._clerk.do(partial(self._finish, running, ending))
 
     def _finish(self, running: _Running, ending: Ending) -> None:
-        summary = running.take.finish(ending)
-        running.writer.note(stats_of(summary))
+        summary = running.take.finish(ending, running.writer)
         try:
             running.writer.close()
         finally:
             self._folder.ended(running.path, summary)
             self._done = f"{running.path.stem} kept"
-        if running.take.sink.failure is not None and ending is not Ending.FAILED:
-            raise running.take.sink.failure
+        running.take.check(ending)
 
     def _discard_last(self, now_ns: int) -> None:
         def discard() -> None:

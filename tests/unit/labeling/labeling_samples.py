@@ -4,6 +4,7 @@ import io
 from pathlib import Path
 
 import numpy as np
+import polars as pl
 from PIL import Image
 
 from sdt_tools.frames import CameraImage, LidarScan, MotionClass, MotionCommand, Received, Twist, ray_angles_rad
@@ -70,6 +71,11 @@ def say(
     with Recording.open(recording) as opened:
         recording_id = opened.recording_id
     with Journal(journal_path(labels_dir, recording.stem, kind), recording_id) as journal:
-        for row in rows:
-            now_ns = START_NS + journal.last_act
-            journal.append(stamp_ns=stamp_ns(row), label=label, labeler=labeler, source=source, created_ns=now_ns)
+        said = {
+            "stamp_ns": [stamp_ns(row) for row in rows],
+            "label": [label] * len(rows),
+            "labeler": [labeler] * len(rows),
+            "source": [str(source)] * len(rows),
+            "created_ns": [START_NS + journal.last_act + number for number in range(len(rows))],
+        }
+        journal.append_table(pl.DataFrame(said))
