@@ -9,7 +9,7 @@ import math
 import threading
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
-from typing import Final, Protocol
+from typing import Final, Protocol, runtime_checkable
 
 from sdt_tools.errors import UsageError
 from sdt_tools.frames import MotionClass
@@ -32,6 +32,7 @@ BTN_START: Final = 0x13B
 DEAD_SHARE: Final = 1.0 / 3.0
 
 
+@runtime_checkable
 class InputEvent(Protocol):
     """An event of an input device."""
 
@@ -40,6 +41,7 @@ class InputEvent(Protocol):
     value: int
 
 
+@runtime_checkable
 class Pad(Protocol):
     """A gamepad that is open."""
 

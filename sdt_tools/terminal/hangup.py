@@ -1,7 +1,6 @@
 """A terminal that goes away while an app is on it: noticed at once, and no reason for the app to fail."""
 
 import select
-import sys
 import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
@@ -55,14 +54,14 @@ class LastingDriver(LinuxDriver):
 
 
 @contextmanager
-def hangup_watched(gone: Callable[[], None], descriptor: int | None = None) -> Iterator[None]:
+def hangup_watched(gone: Callable[[], None], descriptor: int = 0) -> Iterator[None]:
     """Within the block ``gone`` is called, in a thread, when the terminal behind ``descriptor`` hangs up.
 
-    That is stdin's, where nothing else is given. SIGHUP tells of it too, but not everyone who runs in a terminal gets
+    SIGHUP tells of it too, but not everyone who runs in a terminal gets
     the signal.
     """
     poll = select.poll()
-    poll.register(sys.stdin.fileno() if descriptor is None else descriptor, 0)  # a hang-up is always told
+    poll.register(descriptor, 0)  # a hang-up is always told
     ended = threading.Event()
 
     def watch() -> None:

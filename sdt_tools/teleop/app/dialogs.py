@@ -1,19 +1,19 @@
 """What opens over the cockpit: the keys, and a line for a note."""
 
+from collections.abc import Iterable
 from typing import ClassVar
 
 from rich.style import Style
 from rich.text import Text
 from textual import on
-from textual.app import ComposeResult
 from textual.binding import BindingType
 from textual.containers import Horizontal, Vertical
 from textual.screen import ModalScreen
+from textual.widget import Widget
 from textual.widgets import Input, Static
 
 from sdt_tools.teleop.app.keys import GROUPS, Key
-from sdt_tools.teleop.app.words import BRIGHT, DIM, bold
-from sdt_tools.terminal.raster import style
+from sdt_tools.teleop.app.words import BRIGHT, DIM, bold, ink
 
 _DRIVE = (
     ("↖ ↑ ↗", "q w e   7 8 9   ← ↑ →"),
@@ -33,7 +33,7 @@ class HelpDialog(ModalScreen[None]):
     """
     BINDINGS: ClassVar[list[BindingType]] = [("question_mark,enter,space", "dismiss")]
 
-    def compose(self) -> ComposeResult:
+    def compose(self) -> Iterable[Widget]:
         """Two columns."""
         with Vertical(), Horizontal():
             yield Static(Text.assemble(_driving(), *(_group(name) for name in ("Stop", "Speed"))))
@@ -53,7 +53,7 @@ class NoteDialog(ModalScreen[str]):
         super().__init__()
         self._mark = name
 
-    def compose(self) -> ComposeResult:
+    def compose(self) -> Iterable[Widget]:
         """A line to type in."""
         with Vertical():
             yield Static(f"{self._mark} is set. A note on it? Enter ends it · Esc is the emergency stop", markup=False)
@@ -68,8 +68,8 @@ class NoteDialog(ModalScreen[str]):
 def _driving() -> Text:
     text = Text("Drive: letters, number pad, arrows\n", Style(bold=True))
     for signs, keys in _DRIVE:
-        text.append(f"{signs}  ", bold(BRIGHT)).append(f"{keys}\n", style_of_dim())
-    return text.append("A motion holds while its key repeats.\n", style_of_dim())
+        text.append(f"{signs}  ", bold(BRIGHT)).append(f"{keys}\n", ink(DIM))
+    return text.append("A key that repeats holds on.\n", ink(DIM))
 
 
 def _group(name: str) -> Text:
@@ -80,9 +80,4 @@ def _group(name: str) -> Text:
 
 
 def _line(key: Key) -> Text:
-    return Text(key.shown.ljust(7), bold(BRIGHT)).append(f"{key.does}\n", style_of_dim())
-
-
-def style_of_dim() -> Style:
-    """Quiet words on whatever is behind."""
-    return Style(color=style(DIM).color)
+    return Text(key.shown.ljust(7), bold(BRIGHT)).append(f"{key.does}\n", ink(DIM))

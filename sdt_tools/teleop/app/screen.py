@@ -1,13 +1,14 @@
 """The cockpit's screen: keys move the hand and say what is wanted; ten times a second the newest is shown."""
 
+from collections.abc import Iterable
 from typing import ClassVar, Final
 
 from rich.text import Text
 from textual import events
-from textual.app import ComposeResult
 from textual.binding import BindingType
 from textual.containers import Horizontal, Vertical
 from textual.screen import Screen
+from textual.widget import Widget
 from textual.widgets import Static
 
 from sdt_tools.class_colors import MOTIONS
@@ -15,10 +16,9 @@ from sdt_tools.frames import Gesture, LidarScan, MotionClass, MotionCommand
 from sdt_tools.recording.live.control import Wish
 from sdt_tools.teleop.app.dialogs import HelpDialog, NoteDialog
 from sdt_tools.teleop.app.keys import ACTIONS, MOTION_KEYS
-from sdt_tools.teleop.app.words import BRIGHT, DIM, changes, heading, messages, motion_panel, streams_panel
+from sdt_tools.teleop.app.words import BRIGHT, DIM, changes, heading, ink, messages, motion_panel, streams_panel
 from sdt_tools.teleop.cockpit import Cockpit
 from sdt_tools.terminal.picture_view import PictureView
-from sdt_tools.terminal.raster import style
 from sdt_tools.terminal.scan_view import ScanView
 
 SHOW_S: Final = 0.1
@@ -34,6 +34,7 @@ class CockpitScreen(Screen[None]):
     BINDINGS: ClassVar[list[BindingType]] = [("ctrl+c", "app.quit")]
     CSS = """
     CockpitScreen { background: #101218; color: #d8dce4; }
+    CockpitScreen Static { text-wrap: nowrap; text-overflow: ellipsis; }
     CockpitScreen .line { height: 1; }
     #hints { background: #1a1e28; }
     #main { height: 1fr; }
@@ -42,8 +43,8 @@ class CockpitScreen(Screen[None]):
     #motion { height: 7; }
     #streams { height: 5; }
     #messages { height: 2; }
-    .wide #side { width: 62; }
-    .wide #messages { height: 8; }
+    CockpitScreen.wide #side { width: 62; }
+    CockpitScreen.wide #messages { height: 8; }
     """
 
     def __init__(self, cockpit: Cockpit) -> None:
@@ -55,7 +56,7 @@ class CockpitScreen(Screen[None]):
         self._words_left = 0
         self._marks = 0
 
-    def compose(self) -> ComposeResult:
+    def compose(self) -> Iterable[Widget]:
         """Heading; scan, picture, motion, streams; messages; keys."""
         yield Static(id="heading", classes="line", markup=False)
         with Horizontal(id="main"):
@@ -102,8 +103,7 @@ class CockpitScreen(Screen[None]):
         lines = self.query_one("#messages", Static)
         lines.update(messages(view, lines.size.height, width), layout=False)
         self._words_left = max(self._words_left - 1, 0)
-        hint = Text(f" {self._words}", style(BRIGHT)) if self._words_left else Text(HINTS, style(DIM))
-        hint.no_wrap = True
+        hint = Text(f" {self._words}", ink(BRIGHT)) if self._words_left else Text(HINTS, ink(DIM))
         self.query_one("#hints", Static).update(hint, layout=False)
         if (view.scan, view.command) != self._drawn:
             self._drawn = view.scan, view.command

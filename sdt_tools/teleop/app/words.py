@@ -75,7 +75,7 @@ def _disk(progress: RecordingProgress | None) -> Text:
 def motion_panel(cockpit: Cockpit, view: View) -> Text:
     """Who drives, the seven motions with their keys and the one that is driven, the twist, speed, mode, gesture."""
     command, hand = view.command, cockpit.hand.state
-    text = Text(no_wrap=True, overflow="ellipsis").append_text(_driver(cockpit, view)).append("\n")
+    text = Text().append_text(_driver(cockpit, view)).append("\n")
     driven = None if command is None else command.motion
     for motions, keys, signs in zip(_PAD, _PAD_KEYS, _SIGNS, strict=True):
         text.append("  ")
@@ -92,7 +92,7 @@ def motion_panel(cockpit: Cockpit, view: View) -> Text:
         text.append("\n")
     twist = Twist(0.0, 0.0) if command is None else command.twist
     label = "–" if driven is None else driven.label
-    text.append(f" {label:<15} ", bold(BRIGHT if driven is None else MOTIONS[driven.label]))
+    text.append(f" {label:<14} ", bold(BRIGHT if driven is None else MOTIONS[driven.label]))
     text.append(f"{twist.linear_mps:+.2f} m/s {twist.angular_radps:+.2f} rad/s\n", style(BRIGHT))
     mode = Mode.ACTIVE if command is None else command.mode
     text.append(" mode     ", style(DIM)).append(mode.label, style(MODES[mode.label], bold=True))
@@ -117,7 +117,7 @@ def _driver(cockpit: Cockpit, view: View) -> Text:
 
 def streams_panel(view: View) -> Text:
     """A line a stream: rate and age; then what was lost."""
-    text = Text(no_wrap=True, overflow="ellipsis")
+    text = Text()
     streams = view.streams or {}
     for topic, name in _SHOWN.items():
         stream = streams.get(topic)
@@ -144,7 +144,7 @@ def _stream(stream: Stream | None) -> Text:
 
 def messages(view: View, lines: int, width: int) -> Text:
     """The newest lines of the log, the newest last."""
-    text = Text(no_wrap=True, overflow="ellipsis")
+    text = Text()
     shown = view.entries[-lines:] if lines > 0 else ()
     for number, entry in enumerate(shown):
         color = {LogLevel.WARNING: WARM, LogLevel.ERROR: ALARM}.get(entry.level, DIM)
@@ -164,6 +164,11 @@ def changes(before: HandState, now: HandState, driver: str, by_hand: bool) -> li
     if not by_hand and before.stopped and not now.stopped:
         said.append(f"the stop by hand is over; {driver} may drive")
     return said
+
+
+def ink(color: Rgb) -> Style:
+    """A colour on whatever is behind."""
+    return Style(color=style(color).color)
 
 
 def bold(color: Rgb) -> Style:
