@@ -45,6 +45,8 @@ class DatasetSummary:
     counts: dict[str, dict[str, int]]
     conflicts: int | None
     """Frames in a safety domain with a forbidden label; None where they were not looked for."""
+    interventions: int
+    """Motions that people drove after taking over, among the labels; 0 where they are not asked for."""
     unmatched_labels: int
     """Labels without a scan near enough."""
     disputed_stamps: int
@@ -85,6 +87,11 @@ def build_dataset(
     named = frozenset(recording.recording_id for recording in labelled[len(recordings) :])
     labelled.sort(key=lambda recording: recording.recording_id)
     _refuse_repeated(labelled)
+    if config.interventions == "only" and not any(recording.interventions for recording in labelled):
+        raise DatasetError(
+            "nobody took over in these recordings, so there are no interventions; "
+            "record with --cockpit and a policy, and drive where it errs"
+        )
     selections = select_frames(labelled, config, named)
     classes = LabelKind(config.kind).classes
     with _folder_when_whole(out) as scratch:
@@ -113,6 +120,7 @@ def build_dataset(
         val_frames=sum(counts[VAL].values()),
         counts=counts,
         conflicts=None if found is None else len(found),
+        interventions=sum(recording.interventions for recording in labelled),
         unmatched_labels=sum(recording.unmatched for recording in labelled),
         disputed_stamps=sum(recording.disputed for recording in labelled),
         broken_lines=sum(recording.broken_lines for recording in labelled),

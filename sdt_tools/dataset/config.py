@@ -15,6 +15,11 @@ class DatasetConfig(Config):
     """
 
     kind: Literal["motion"] = "motion"
+    interventions: Literal["none", "only", "also"] = "none"
+    """Frames at which a person took over from a policy, labelled by what he drove: not used, alone, or beside labels.
+
+    Beside labels, people's labels go before them, and they go before all others.
+    """
     tolerance_ms: float = Field(default=10.0, ge=0.0, le=1000.0)
     """A label belongs to a scan that is no farther from it in time: half a period of a scan at 50 Hz."""
     spacing_s: float = Field(default=0.4, ge=0.0)
