@@ -1,6 +1,6 @@
 """The live loop: reads a source, asks a driver, moves the robot, hands everything to whoever records it."""
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import suppress
 from time import perf_counter
 from typing import Final, Protocol, runtime_checkable
@@ -99,6 +99,8 @@ class LiveLoop:
         self._progress = progress
         self._encoder = encoder or PictureEncoder(behind=False)
         self._now_ns = source.start_ns
+        self._under_way: tuple[int, Iterator[Received | RawPicture]] | None = None
+        """What is being read, and up to when."""
         self._reported_s = 0.0
         self._stands = False
 
@@ -176,32 +178,47 @@ class LiveLoop:
         while not interrupt.requested:
             now_ns = self._pace.next_ns()
             end_ns = recorder.end_ns
-            if end_ns is not None and now_ns >= end_ns:
-                self._read(end_ns - 1)
+            ends = end_ns is not None and now_ns >= end_ns
+            is_read = self._read(now_ns if end_ns is None or not ends else end_ns - 1)
+            if is_read and end_ns is not None and ends:
                 self._now_ns = end_ns
                 self.settle()
                 self._log_all(recorder.time_up(end_ns))
                 if recorder.ending is not None:
                     return recorder.ending
-            self._read(now_ns)
-            if self._source.finished:
+                is_read = self._read(now_ns)
+            if is_read and self._source.finished:
                 return Ending.SOURCE
-            self._drive(now_ns)
-            self._log_all(recorder.tick(now_ns))
+            self._drive(self._now_ns)
+            self._log_all(recorder.tick(self._now_ns))
             if recorder.ending is not None:
                 return recorder.ending
             self._report()
         assert interrupt.signal is not None
         return ENDING_BY_SIGNAL[interrupt.signal]
 
-    def _read(self, until_ns: int) -> None:
-        self._now_ns = until_ns
-        for sensed in self._source.read(until_ns):
-            if isinstance(sensed, RawPicture):
-                self._encoder.put(sensed)
-            else:
-                self._take(sensed)
-            self._take_pictures()
+    def _read(self, until_ns: int) -> bool:
+        """Read the source up to ``until_ns``, or as far as that does not take long; whether all is read.
+
+        Where it is not, the next call goes on from there, and it is as early as what was read last.
+        """
+        while True:
+            if self._under_way is None:
+                self._under_way = until_ns, iter(self._source.read(until_ns))
+            goal_ns, reading = self._under_way
+            for sensed in reading:
+                self._now_ns = max(self._now_ns, sensed.received_ns)
+                if isinstance(sensed, RawPicture):
+                    self._encoder.put(sensed)
+                else:
+                    self._take(sensed)
+                self._take_pictures()
+                if self._pace.takes_long():
+                    return False
+            self._under_way = None
+            if goal_ns >= until_ns:
+                self._now_ns = goal_ns
+                return True
 
     def _take_pictures(self) -> None:
         """Those that are encoded by now, and those that were dropped, in their order."""

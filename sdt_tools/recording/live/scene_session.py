@@ -9,7 +9,8 @@ from pydantic import Field
 
 from sdt_tools.clock import FAST_EPOCH_NS, HostClock
 from sdt_tools.config import Config, dump_config
-from sdt_tools.protocols import Chooser, Driver, Observer
+from sdt_tools.frames import LidarScan, Received
+from sdt_tools.protocols import Chooser, Driver, Observation, Observer
 from sdt_tools.recording.live.control import Control
 from sdt_tools.recording.live.interrupt import Interrupt, deferred_interrupt
 from sdt_tools.recording.live.outcome import RecordingProgress, RecordingSummary
@@ -74,7 +75,7 @@ def _record_scene(
     clock = HostClock()
     layout = layout_for(config.scenario, config.seed)
     if config.realtime:
-        warm_up(layout, config)
+        warm_up(layout, config, make_driver)
     start_ns = clock.now_ns() if config.realtime else FAST_EPOCH_NS
     source = SceneSource(layout, config.scene, config.camera, start_ns)
     driver = make_driver(config.driver, source)
@@ -109,9 +110,16 @@ def _record_scene(
     return replace(summary, size_bytes=writer.size)
 
 
-def warm_up(layout: Layout, config: SceneRecordingConfig) -> None:
-    """Import and compile what the scene needs, so that it can keep the pace from its first second on."""
+def warm_up(layout: Layout, config: SceneRecordingConfig, make_driver: MakeDriver) -> None:
+    """Import and compile what scene and driver need, so that they can keep the pace from their first second on."""
     scene = SceneSource(layout, config.scene, config.camera)
-    for _ in scene.read(scene.start_ns):
-        pass
+    scan = None
+    for sensed in scene.read(scene.start_ns):
+        if isinstance(sensed, Received) and isinstance(sensed.message, LidarScan):
+            scan = sensed.message
     scene.expert.advise()
+    driver, observation = make_driver(config.driver, scene), Observation(scene.start_ns, scan, None)
+    if isinstance(driver, Chooser):
+        driver.choose(observation)
+    else:
+        driver.decide(observation)

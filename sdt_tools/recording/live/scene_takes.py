@@ -102,7 +102,7 @@ def _play_world(
     seed = config.seed + session.start_world()
     layout = layout_for(config.scenario, seed)
     if config.realtime:
-        warm_up(layout, config)
+        warm_up(layout, config, make_driver)
     start_ns = clock.now_ns() if config.realtime else FAST_EPOCH_NS
     source = SceneSource(layout, config.scene, config.camera, start_ns)
     rates = config.scene.rates

@@ -31,13 +31,18 @@ class HelpDialog(ModalScreen[None]):
     HelpDialog Horizontal { height: auto; }
     HelpDialog Static { width: 1fr; }
     """
-    BINDINGS: ClassVar[list[BindingType]] = [("question_mark,enter,space", "dismiss")]
+    BINDINGS: ClassVar[list[BindingType]] = [("question_mark,enter,space", "close")]
 
     def compose(self) -> Iterable[Widget]:
         """Two columns."""
         with Vertical(), Horizontal():
             yield Static(Text.assemble(_driving(), *(_group(name) for name in ("Stop", "Speed"))))
             yield Static(Text.assemble(*(_group(name) for name in ("Takes", "Operator (scene)", "See"))))
+
+    def action_close(self) -> None:
+        """Close, once: a key that repeats must not close what is below."""
+        if self.is_current:
+            self.dismiss()
 
 
 class NoteDialog(ModalScreen[str]):
@@ -61,8 +66,9 @@ class NoteDialog(ModalScreen[str]):
 
     @on(Input.Submitted)
     def give(self, event: Input.Submitted) -> None:
-        """Give the note."""
-        self.dismiss(event.value.strip())
+        """Give the note, once: a key that repeats must not close what is below."""
+        if self.is_current:
+            self.dismiss(event.value.strip())
 
 
 def _driving() -> Text:

@@ -43,8 +43,8 @@ class CockpitScreen(Screen[None]):
     #motion { height: 7; }
     #streams { height: 5; }
     #messages { height: 2; }
-    CockpitScreen.wide #side { width: 62; }
-    CockpitScreen.wide #messages { height: 8; }
+    CockpitScreen.wide #side { width: 39%; }
+    CockpitScreen.wide #messages { height: 15%; }
     """
 
     def __init__(self, cockpit: Cockpit) -> None:

@@ -1,5 +1,6 @@
 import signal
 from collections import Counter
+from collections.abc import Iterator
 from contextlib import suppress
 from pathlib import Path
 
@@ -11,7 +12,7 @@ from recording_samples import PERIOD_NS, T0, image, scan
 from sdt_tools.clock import SECOND_NS
 from sdt_tools.config import MotionConfig
 from sdt_tools.errors import RecordingError, RunError
-from sdt_tools.frames import MotionClass, MotionCommand, Received, Twist
+from sdt_tools.frames import LidarScan, MotionClass, MotionCommand, Received, Twist
 from sdt_tools.protocols import Observation
 from sdt_tools.recording.live.decide import STOP
 from sdt_tools.recording.live.gaps import GapCounter
@@ -221,6 +222,42 @@ def test_a_slow_driver_in_real_time_loses_decisions_but_no_scan(tmp_path: Path) 
     assert len(scans) >= 49
     assert summary.decisions < 6
     assert summary.missed_deadlines > 10
+
+
+class Toiling(TapeSource):
+    """Takes 30 ms of the clock for each scan of 20 ms: it never keeps up."""
+
+    clock: HandClock
+
+    def read(self, until_ns: int) -> Iterator[Received]:
+        for received in super().read(until_ns):
+            self.clock.sleep(0.03)
+            yield received
+
+
+def toiling(tmp_path: Path, happens: dict[int, int] | None = None) -> tuple[Rig, HandClock]:
+    source = Toiling([scan(n) for n in range(200)], happens or {})
+    source.clock = HandClock()
+    return Rig(tmp_path / "r.mcap", source), source.clock
+
+
+def test_a_source_that_cannot_keep_up_is_driven_all_the_same(tmp_path: Path) -> None:
+    setup, clock = toiling(tmp_path)
+    summary = setup.run(seconds=3.0, realtime=True, clock=clock, sleep_s=clock.sleep)
+    assert (summary.ending, summary.frames["/lidar/scan"]) == (Ending.TIME, 150)
+    assert summary.missed_deadlines > 0
+    passed = [m for m in setup.read() if isinstance(m.message, MotionCommand)]
+    apart_ns = np.diff([m.received_ns for m in passed])
+    assert len(passed) >= 25
+    assert apart_ns.max() <= 8 * PERIOD_NS
+    assert [m.received_ns for m in passed] == sorted(m.received_ns for m in passed)
+
+
+def test_a_source_that_cannot_keep_up_does_not_keep_a_signal_waiting(tmp_path: Path) -> None:
+    setup, clock = toiling(tmp_path, {100: signal.SIGTERM})
+    setup.run(realtime=True, clock=clock, sleep_s=clock.sleep)
+    scans = [m for m in setup.read() if isinstance(m.message, LidarScan)]
+    assert 100 <= len(scans) <= 103
 
 
 def test_progress_tells_where_the_recording_stands(tmp_path: Path) -> None:

@@ -10,7 +10,7 @@ from time import sleep
 import pytest
 from cockpit_samples import PROGRESS, Clock, Operator, cockpit, recording, seen, wanted
 from textual.pilot import Pilot
-from textual.widgets import Static
+from textual.widgets import Input, Static
 
 from sdt_tools.errors import RunError
 from sdt_tools.frames import Gesture, LogEntry, LogLevel, MotionClass, Received
@@ -152,6 +152,22 @@ def test_takes_marks_and_notes_are_wanted() -> None:
         (Wish.MARK, "mark 2"),
         (Wish.QUIT, ""),
     ]
+
+
+@pytest.mark.parametrize("opened", ["m", "?"])
+def test_enter_that_repeats_closes_what_is_open_and_nothing_below(opened: str) -> None:
+    async def press(app: CockpitApp, pilot: Pilot) -> None:
+        await pilot.press(opened)
+        dialog = app.screen
+        for _ in range(3):  # all before it has closed
+            if isinstance(dialog, HelpDialog):
+                dialog.action_close()
+            else:
+                await dialog.query_one(Input).action_submit()
+        await pilot.pause()
+        assert isinstance(app.screen, CockpitScreen)
+
+    use(cockpit(), press)
 
 
 def test_one_recording_has_no_takes() -> None:
