@@ -49,7 +49,11 @@ def seat(
 
     def make_seated(name: str, source: "SceneSource") -> "Chooser":
         cockpit.operator = source
-        return ByHand(hand, name) if by_hand else Takeover(make_driver(name, source), hand)
+        if by_hand:
+            return ByHand(hand, name)
+        takeover = Takeover(make_driver(name, source), hand)
+        cockpit.driver = takeover.name
+        return takeover
 
     with closing(open_gamepad(hand)) if how.gamepad or driver == GAMEPAD else nullcontext():
         yield cockpit, make_seated
