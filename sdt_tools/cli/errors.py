@@ -39,7 +39,7 @@ def analyse(
     from sdt_tools.error_analysis.definitions import ErrorOptions
 
     options = load_config(ErrorOptions, config)
-    with progress_bar("reading scans") as progress:
+    with progress_bar("scans, then neighbours") as progress:
         report = analyse_errors(predictions, recordings, options, out, model, progress)
     if json_output:
         emit({**report.document(), "out": str(out)})

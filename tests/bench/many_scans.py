@@ -69,7 +69,7 @@ def _varied(drive: np.ndarray, drives: list[np.ndarray], rng: np.random.Generato
 
 
 def many_predictions(scans: np.ndarray, recording: np.ndarray, seed: int) -> pl.DataFrame:
-    """Predictions over them, 5 % wrong: three in five errors under one condition, a quarter alone, the rest in bursts."""
+    """Predictions over them, 5 % wrong: more than half under one condition, a quarter alone, the rest in bursts."""
     rng = np.random.default_rng(seed)
     total = len(scans)
     front_m = scans[:, 150:390].min(axis=1)
