@@ -1,9 +1,9 @@
 """Exact ε-neighbours of some frames among all frames, counted.
 
-Scans are projected on their principal directions; the length r of what is left over is one more coordinate. With p the
-projections, |p - p'|² + (r - r')² ≤ |x - x'|² ≤ |p - p'|² + (r + r')². The lower bound rules out and the upper one takes
-in, exactly: single frames, and, by the boxes of a median-split tree over these coordinates, thousands at once. Only
-what is left is measured over all rays, and abandoned as soon as it exceeds ε.
+Scans are projected on their principal directions; the length r of what is left over is one more coordinate. With p
+the projections, |p - p'|² + (r - r')² ≤ |x - x'|² ≤ |p - p'|² + (r + r')². The lower bound rules out and the upper one
+takes in, exactly: single frames, and, by the boxes of a median-split tree over these coordinates, thousands at once.
+Only what is left is measured over all rays, and abandoned as soon as it exceeds ε.
 
 Neighbours are counted, never listed, so memory does not grow with ε. Scans are read where they lie, in their own order
 (which is that of time, as neighbours mostly are): they may be a mapped file larger than memory.

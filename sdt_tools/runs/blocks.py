@@ -7,7 +7,7 @@ numpy over large arrays).
 
 import os
 from collections.abc import Callable
-from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
+from concurrent.futures import ThreadPoolExecutor
 
 from sdt_tools.runs.local import Progress
 
@@ -26,22 +26,21 @@ def in_blocks(
 ) -> None:
     """Call ``work`` with every block of ``rows``, in threads: one a core, or ``workers``.
 
-    ``progress`` hears of the rows done. A failure or Ctrl-C ends it when the blocks at work are done.
+    ``progress`` hears of the rows done. A failure, the first one's, or Ctrl-C ends it when the blocks at work are done.
     """
     blocks = [slice(start, min(start + block, rows)) for start in range(0, rows, block)]
-    done = 0
-    if progress:
-        progress(0, rows)
-    with ThreadPoolExecutor(workers or usable_cores()) as pool:
-        pending: set[Future[None]] = {pool.submit(work, one) for one in blocks}
+    report = progress or _silent
+    report(0, rows)
+    with ThreadPoolExecutor(workers or usable_cores(), "blocks") as pool:
+        futures = [pool.submit(work, one) for one in blocks]
         try:
-            while pending:
-                finished, pending = wait(pending, return_when=FIRST_COMPLETED)
-                for future in finished:
-                    future.result()
-                done += len(finished)
-                if progress:
-                    progress(min(done * block, rows), rows)
+            for one, future in zip(blocks, futures, strict=True):
+                future.result()
+                report(one.stop, rows)
         except BaseException:
             pool.shutdown(wait=False, cancel_futures=True)
             raise
+
+
+def _silent(done: int, rows: int) -> None:
+    """Nobody listens."""
