@@ -32,7 +32,10 @@ def analyse(
     config: Annotated[Path | None, typer.Option(help="TOML file of options, such as loss, eta and epsilon_m.")] = None,
     json_output: JsonFlag = False,
 ) -> None:
-    """Tag every wrong frame: systematic, conditional (and on what), transient, isolated or unexplained."""
+    """Tag every wrong frame: systematic, conditional (and on what), transient, isolated or unexplained.
+
+    While it works, the scans lie in a nameless file beside --out, 2.2 kB each: they need not fit in memory.
+    """
     from sdt_tools.cli.progress import progress_bar
     from sdt_tools.config import load_config
     from sdt_tools.error_analysis.analyse import analyse_errors

@@ -25,7 +25,7 @@ LEAF_FRAMES: Final = 128
 SAMPLE_FRAMES: Final = 2_000
 """Frames from which the principal directions are taken: they change the speed, never the answer."""
 BLOCK_FRAMES: Final = 4_096
-BLOCK_QUERIES: Final = 256
+BLOCK_QUERIES: Final = 64
 KEY_MARGIN: Final = 1e-5
 """More than the relative rounding error of a squared distance between keys, summed in float32."""
 
@@ -92,8 +92,9 @@ def count_neighbours(
     place = np.empty_like(index.order)
     place[index.order] = np.arange(len(place))
     limit = epsilon_m * epsilon_m * index.scans.shape[1]
-    outer = (np.sqrt(limit) + index.key_slack) ** 2 * (1.0 + KEY_MARGIN)
-    inner = max(np.sqrt(limit) - index.key_slack, 0.0) ** 2 * (1.0 - KEY_MARGIN)
+    length, slack = np.sqrt(limit), index.key_slack
+    outer = (length + slack) ** 2 * (1.0 + KEY_MARGIN)
+    inner = (length - slack) ** 2 * (1.0 - KEY_MARGIN) if length > slack else -1.0  # below rounding keys say nothing
     members = _members(index.tree, groups, index.order)
     counts = np.zeros((len(rows), len(groups)), np.int64)
 

@@ -23,7 +23,7 @@ from sdt_tools.replay.predictions import SCHEMA
 
 FRAMES = 1_000_000
 SEED = 1000
-PEER_QUERIES = 60
+PEER_QUERIES = 1_000
 GROUPS = 60
 """Random halves of all frames: two sets of neighbours that are as many in each half are the same set."""
 

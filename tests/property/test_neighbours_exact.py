@@ -91,3 +91,10 @@ def test_copies_are_the_frames_that_are_equal(frames: list[list[float]]) -> None
     classes = copy_classes(scans)
     equal = (scans[:, None] == scans[None]).all(axis=2)
     np.testing.assert_array_equal(classes[:, None] == classes[None], equal)
+
+
+def test_frames_whose_keys_round_to_the_same_are_still_told_apart() -> None:
+    near = np.float32(0.1)
+    scans = np.array([[near], [np.nextafter(near, np.float32(1.0))], *[[2.5]] * 8], np.float32)
+    counts = count_neighbours(build_index(scans), np.arange(2), 1e-10, np.ones((1, len(scans)), bool))
+    assert counts.tolist() == [[0, 0]]
