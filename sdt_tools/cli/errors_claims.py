@@ -69,23 +69,23 @@ def command(
 
 
 def _print(report: "ClaimReport") -> None:
+    from itertools import groupby
+
     from rich.table import Table
 
-    table = Table("claim", "about", "verdict", "why", "value (95 %)", "frames", "recordings", "broken premises")
-    for verdict in report.verdicts:
-        broken = [premise.name for premise in verdict.premises if premise.holds is False]
-        finding = str(verdict.finding)
-        table.add_row(
-            verdict.claim.replace("_", " "),
-            verdict.about,
-            f"[{_COLOURS[finding]}]{finding}",
-            verdict.reason,
-            verdict.estimate.text(),
-            f"{verdict.frames:,}",
-            f"{verdict.recordings:,}",
-            ", ".join(broken),
-        )
-    console.print(table)
+    for statement, verdicts in groupby(report.verdicts, key=lambda verdict: verdict.statement):
+        console.print(f"\n[bold]{statement}")
+        table = Table.grid(padding=(0, 2))
+        notes = []
+        for verdict in verdicts:
+            finding = str(verdict.finding)
+            support = f"{verdict.frames:,} frames, {verdict.recordings:,} recordings" if verdict.frames else ""
+            value = verdict.estimate.text() if verdict.frames else verdict.reason
+            table.add_row(verdict.about, f"[{_COLOURS[finding]}]{finding}", value, support)
+            notes += [premise.name for premise in verdict.premises if premise.holds is False]
+        console.print(table)
+        if notes:
+            console.print(f"broken premises: {', '.join(dict.fromkeys(notes))}")
     for left_out in report.summary["left_out"]:
         console.print(
             f"[yellow]{left_out['model']}: {left_out['without_partner']:,} frames were not answered by all, "

@@ -7,6 +7,7 @@ from typing import Any, Final
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
 from matplotlib.ticker import PercentFormatter
 
 from sdt_tools.error_analysis.claims import adversarial, implication, nested, profile, propositions, theorem
@@ -84,6 +85,7 @@ def _implication(verdicts: Sequence[ClaimVerdict]) -> Figure:
             )
             panel.plot(middle_m, [point["value"] for point in curve], "o-", color=_SAFE, markersize=4)
             panel.plot(middle_m, numbers["decreasing_fit"], "--", color=_CHANCE, linewidth=1.5)
+            panel.set_xscale("log")
             rank = numbers["rank_correlation"]
             panel.set_title(
                 f"rank correlation {rank['value']:.2f} ({_or_nan(rank['low']):.2f} to {_or_nan(rank['high']):.2f})",
@@ -123,9 +125,10 @@ def _nested(verdicts: Sequence[ClaimVerdict]) -> Figure:
         figure,
         {
             **{str(finding): _FINDING[finding] for finding in {verdict.finding for verdict in verdicts}},
-            "| by chance": _CHANCE,
-            "◇ in the same level, trained again": _STANDARD,
+            "by chance": _CHANCE,
+            "in the same level, trained again": _STANDARD,
         },
+        {"by chance": "|", "in the same level, trained again": "D"},
     )
     return figure
 
@@ -135,7 +138,7 @@ def _profile(verdicts: Sequence[ClaimVerdict]) -> Figure:
     forward = [verdict for verdict in verdicts if verdict.claim == profile.FORWARD]
     conditional = [verdict for verdict in verdicts if verdict.claim == profile.CONDITIONAL]
     figure = Figure(figsize=(11.0, 2.2 + 0.6 * max(len(forward), len(conditional), 1)), layout="constrained")
-    left, middle, right = figure.subplots(1, 3, width_ratios=(1, 1, 1.4))
+    left, middle, right = figure.subplots(1, 3, width_ratios=(1, 1, 1.9))
     for place, verdict in enumerate(forward):
         _point(left, verdict.numbers["share"], place - 0.1, _SAFE, filled=True)
         _point(left, verdict.numbers["base"], place + 0.1, _CHANCE, filled=False)
@@ -275,8 +278,10 @@ def _tidy(axes: Axes, grid: str) -> None:
     axes.spines[["top", "right"]].set_visible(False)
 
 
-def _legend(figure: Figure, names: Mapping[str, str]) -> None:
-    from matplotlib.lines import Line2D
-
-    handles = [Line2D([], [], color=colour, marker="o", linestyle="", label=name) for name, colour in names.items()]
+def _legend(figure: Figure, colours: Mapping[str, str], markers: Mapping[str, str] | None = None) -> None:
+    """Names below the picture; those without a marker of their own have a dot."""
+    handles = [
+        Line2D([], [], color=colour, marker=(markers or {}).get(name, "o"), linestyle="", label=name)
+        for name, colour in colours.items()
+    ]
     figure.legend(handles=handles, loc="outside lower center", ncols=len(handles), frameon=False, fontsize=8)

@@ -57,6 +57,13 @@ def _judge(material: Material, level: int, correlogram: Correlogram | None, opti
     reason = reason_of(finding, "the excess falls with distance", "the excess grows with distance")
     if not added:
         reason = "at no distance are more errors made than without domains"
+    scenarios = _by_scenario(material, level, distance_m, outside, options)
+    against = sum(1 for one in scenarios.values() if one.low > 0.0)
+    alone = sum(1 for one in scenarios.values() if one.high < 0.0)
+    if added and scenarios:
+        reason += f"; within scenarios it falls in {alone} of {len(scenarios)}" + (
+            f", grows in {against}" if against else ""
+        )
     vanishes = [edge for edge, bound in zip(edges_m[1:], numbers["curve"], strict=True) if (bound["low"] or 0.0) > 0.0]
     return ClaimVerdict(
         claim=CLAIM,
@@ -73,6 +80,7 @@ def _judge(material: Material, level: int, correlogram: Correlogram | None, opti
             "distance_edges_m": edges_m.tolist(),
             "distance_mean_m": _bin_means(distance_m, bins),
             "excess_up_to_m": vanishes[-1] if vanishes else None,
+            "rank_correlation_by_scenario": {name: one.document() for name, one in scenarios.items()},
             **{name: numbers for name, (_, numbers) in trends.items()},
         },
         premises=(
@@ -116,6 +124,26 @@ def _trend(
         "curve": [bound.document() for bound in curve],
         "decreasing_fit": np.asarray(fitted).tolist(),
     }
+
+
+def _by_scenario(
+    material: Material,
+    level: int,
+    distance_m: Float64[np.ndarray, "frames"],
+    outside: np.ndarray,
+    options: ClaimOptions,
+) -> dict[str, Estimate]:
+    """The rank correlation within each scenario of enough recordings: without what only tells scenarios apart."""
+    excess = material.mean_loss(level, options.loss) - material.mean_loss(0, options.loss)
+    scenario = material.frames.table["scenario"].fill_null("unknown").to_numpy()
+    found = {}
+    for name in np.unique(scenario):
+        here = outside & (scenario == name)
+        if material.frames_with(here)[1] >= options.min_recordings:
+            sums = np.zeros((6, len(excess)))
+            sums[:, here] = moments(_ranks(distance_m[here]), _ranks(excess[here]))
+            found[str(name)] = estimate(material.sums(sums), correlation, material.draws)
+    return found
 
 
 def _binned(

@@ -180,9 +180,8 @@ def _locality(material: Material, scans: Float32[np.ndarray, "frames rays"], opt
 def _judge_propositions(
     material: Material, scans: Float32[np.ndarray, "frames rays"] | None, options: ClaimOptions
 ) -> list[ClaimVerdict]:
-    """Of the first network of the strictest level."""
-    levels = material.certified_levels or material.levels
-    place = material.places(levels[-1])[0] if levels else 0
+    """Of the network with the fewest errors, whose lone errors are not lost among others."""
+    place = int(material.frames.wrong.sum(axis=1).argmin())
     network = material.networks[place]
     frames = material.labelled(place, options)
     systematic = judge_systematic(frames, network.name, options)

@@ -124,12 +124,14 @@ def _judge(
     if less:
         finding = Finding.CONTRADICTED
     words = "more" if more is Finding.SUPPORTED else "less" if less else "no more"
+    again = _recurs(failed[pair[0]])
+    same = "" if again is None else f", in the same level trained again {again:.0%}"
     return ClaimVerdict(
         claim=claim,
         about=about,
         statement=STATEMENTS[claim],
         finding=finding,
-        reason=f"{share.value:.0%} recur, {words} than by chance ({chance:.0%}); nested takes {needed:.0%}",
+        reason=f"{share.value:.0%} recur, {words} than by chance ({chance:.0%}){same}; nested takes {needed:.0%}",
         measure="share of failures that recur at the stricter level",
         estimate=share,
         frames=items,
@@ -142,7 +144,7 @@ def _judge(
             "chance": chance,
             "beyond_chance": beyond.document(),
             "failure_rates": [float(first.mean()), float(second.mean())],
-            "recurs_when_trained_again": _recurs(failed[pair[0]]),
+            "recurs_when_trained_again": again,
         },
     )
 
