@@ -86,11 +86,8 @@ def _implication(verdicts: Sequence[ClaimVerdict]) -> Figure:
             panel.plot(middle_m, [point["value"] for point in curve], "o-", color=_SAFE, markersize=4)
             panel.plot(middle_m, numbers["decreasing_fit"], "--", color=_CHANCE, linewidth=1.5)
             panel.set_xscale("log")
-            rank = numbers["rank_correlation"]
-            panel.set_title(
-                f"rank correlation {rank['value']:.2f} ({_or_nan(rank['low']):.2f} to {_or_nan(rank['high']):.2f})",
-                fontsize=8,
-            )
+            value, low, high = (_or_nan(numbers["rank_correlation"][name]) for name in ("value", "low", "high"))
+            panel.set_title(f"rank correlation {value:.2f} ({low:.2f} to {high:.2f})", fontsize=8)
             _tidy(panel, "both")
         row[0].set_ylabel(f"excess {_NATS[loss]}", fontsize=9)
     for panel, verdict in zip(grid[0], verdicts, strict=True):
@@ -246,7 +243,7 @@ def _locality(correlogram: Correlogram) -> Figure:
 
 
 def _point(
-    axes: Axes, estimate: Mapping[str, Any], place: float, colour: str, filled: bool, thin: bool = False
+    axes: Axes, estimate: Mapping[str, Any], place: int | float, colour: str, filled: bool, thin: bool = False
 ) -> None:
     """A value with its interval, lying."""
     value, low, high = (_or_nan(estimate[name]) for name in ("value", "low", "high"))

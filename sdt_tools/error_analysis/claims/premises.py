@@ -40,7 +40,9 @@ def no_conflicts(material: Material, inside: Bool[np.ndarray, "frames"]) -> Prem
 
 
 def bound_holds_for_labels(
-    allowed_loss: Float64[np.ndarray, "inside"], loss_ce: Float64[np.ndarray, "inside"], networks: list[Network]
+    allowed_loss: Float64[np.ndarray, "networks inside"],
+    loss_ce: Float64[np.ndarray, "inside"],
+    networks: list[Network],
 ) -> Premise:
     """The first step of the proof: the loss of a frame inside is at most the bound of its domain.
 

@@ -50,7 +50,7 @@ def _judge(
     premises = (
         bound_below_training_loss(networks),
         no_conflicts(material, inside),
-        bound_holds_for_labels(bounded.ravel(), material.mean_loss(level, "cross_entropy")[inside], networks),
+        bound_holds_for_labels(bounded, material.mean_loss(level, "cross_entropy")[inside], networks),
         training_stability(material, level, options),
         locality(correlogram, options),
     )
@@ -85,9 +85,8 @@ def _numbers(material: Material, level: int, inside: Bool[np.ndarray, "frames"])
     ``same_recordings``: the difference within the recordings that have frames inside, where scenes are the same.
     ``beyond_standard``: the level's difference less that of level 0, which is what safety training did.
     """
-    numbers: dict[str, Any] = {"networks": len(material.places(level)), "networks_that_agree": 0}
-    losses = material.frames.loss_ce[material.places(level)]
-    numbers["networks_that_agree"] = int(np.sum(losses[:, inside].mean(axis=1) <= losses[:, ~inside].mean(axis=1)))
+    alone = [_difference(material, material.frames.loss_ce[place], inside).value for place in material.places(level)]
+    numbers: dict[str, Any] = {"networks": len(alone), "networks_that_agree": int(np.sum(np.array(alone) <= 0.0))}
     there = np.isin(material.frames.recording, np.unique(material.frames.recording[inside]))
     for name in LOSS_NAMES:
         safe = material.mean_loss(level, name)
