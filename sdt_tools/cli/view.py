@@ -46,6 +46,6 @@ def command(
         soft_wrap=True,
     )
     if summary.truncated:
-        console.print("[yellow]the recording was cut off; it is shown as far as it goes")
+        console.print("the recording was cut off; it is shown as far as it goes", style="yellow")
     if not open_:
         console.print(f"look at it with: rerun {target}", soft_wrap=True)
