@@ -72,22 +72,28 @@ def _print(report: "ClaimReport") -> None:
     from itertools import groupby
 
     from rich.table import Table
+    from rich.text import Text
 
     for statement, verdicts in groupby(report.verdicts, key=lambda verdict: verdict.statement):
-        console.print(f"\n[bold]{statement}")
+        console.print(f"\n{statement}", style="bold")
         table = Table.grid(padding=(0, 2))
-        notes = []
+        for _ in range(3):
+            table.add_column(no_wrap=True)
+        table.add_column()
+        broken: dict[str, None] = {}
         for verdict in verdicts:
-            finding = str(verdict.finding)
-            support = f"{verdict.frames:,} frames, {verdict.recordings:,} recordings" if verdict.frames else ""
-            value = verdict.estimate.text() if verdict.frames else verdict.reason
-            table.add_row(verdict.about, f"[{_COLOURS[finding]}]{finding}", value, support)
-            notes += [premise.name for premise in verdict.premises if premise.holds is False]
+            finding = Text(str(verdict.finding), style=_COLOURS[str(verdict.finding)])
+            value = verdict.estimate.text() if verdict.frames else ""
+            support = f"{verdict.frames:,} in {verdict.recordings:,}" if verdict.recordings else verdict.reason
+            table.add_row(verdict.about, finding, value, support)
+            broken |= dict.fromkeys(premise.name for premise in verdict.premises if premise.holds is False)
         console.print(table)
-        if notes:
-            console.print(f"broken premises: {', '.join(dict.fromkeys(notes))}")
+        if broken:
+            console.print(f"broken premises: {', '.join(broken)}", style="yellow")
+    console.print("\nvalues with 95 % intervals over recordings; frames (or worlds, errors) in so many recordings")
     for left_out in report.summary["left_out"]:
         console.print(
-            f"[yellow]{left_out['model']}: {left_out['without_partner']:,} frames were not answered by all, "
-            f"{left_out['other_label']:,} are labelled otherwise elsewhere; left out"
+            f"{left_out['model']}: {left_out['without_partner']:,} frames were not answered by all, "
+            f"{left_out['other_label']:,} are labelled otherwise elsewhere; left out",
+            style="yellow",
         )

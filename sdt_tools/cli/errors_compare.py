@@ -38,8 +38,9 @@ def command(
     for one in frames.mismatches:
         if one.without_partner or one.other_label:
             console.print(
-                f"[yellow]{one.model}: {one.without_partner:,} frames were not answered by all, "
-                f"{one.other_label:,} are labelled otherwise elsewhere; left out"
+                f"{one.model}: {one.without_partner:,} frames were not answered by all, "
+                f"{one.other_label:,} are labelled otherwise elsewhere; left out",
+                style="yellow",
             )
     for comparison in report.comparisons:
         _print(comparison)

@@ -8,7 +8,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
-from matplotlib.ticker import PercentFormatter
+from matplotlib.ticker import NullFormatter, PercentFormatter
 
 from sdt_tools.error_analysis.claims import adversarial, implication, nested, profile, propositions, theorem
 from sdt_tools.error_analysis.claims.locality import Correlogram
@@ -68,7 +68,7 @@ def _theorem(verdicts: Sequence[ClaimVerdict]) -> Figure:
 
 def _implication(verdicts: Sequence[ClaimVerdict]) -> Figure:
     """Excess loss over distance, a column a level."""
-    figure = Figure(figsize=(3.4 * len(verdicts) + 0.6, 5.6), layout="constrained")
+    figure = Figure(figsize=(max(3.4 * len(verdicts) + 0.6, 6.4), 5.8), layout="constrained")
     grid = figure.subplots(2, len(verdicts), squeeze=False, sharey="row")
     for row, loss in zip(grid, _NATS, strict=True):
         for panel, verdict in zip(row, verdicts, strict=True):
@@ -86,6 +86,7 @@ def _implication(verdicts: Sequence[ClaimVerdict]) -> Figure:
             panel.plot(middle_m, [point["value"] for point in curve], "o-", color=_SAFE, markersize=4)
             panel.plot(middle_m, numbers["decreasing_fit"], "--", color=_CHANCE, linewidth=1.5)
             panel.set_xscale("log")
+            panel.xaxis.set_minor_formatter(NullFormatter())
             value, low, high = (_or_nan(numbers["rank_correlation"][name]) for name in ("value", "low", "high"))
             panel.set_title(f"rank correlation {value:.2f} ({low:.2f} to {high:.2f})", fontsize=8)
             _tidy(panel, "both")
@@ -95,7 +96,7 @@ def _implication(verdicts: Sequence[ClaimVerdict]) -> Figure:
     for panel in grid[-1]:
         panel.set_xlabel("distance to the domains (m, RMS per ray)", fontsize=9)
     figure.suptitle(
-        "Implication 1: what safety training adds, by distance (band: 95 % over recordings; dashed: best falling line)",
+        "Implication 1: what safety training adds, by distance\n(band: 95 % over recordings; dashed: best falling)",
         fontsize=10,
     )
     return figure
@@ -189,13 +190,20 @@ def _uniform(verdicts: Sequence[ClaimVerdict]) -> Figure:
     )
     figure = Figure(figsize=(9.0, 1.6 + 0.26 * max(rows, 4)), layout="constrained")
     left, right = figure.subplots(1, 2)
-    _named_points(left, [(f"{v.about}: {n}", p) for v in ratios for n, p in v.numbers["ratios"].items()])
+    _named_points(left, [(_of(v, ratios, n), p) for v in ratios for n, p in v.numbers["ratios"].items()])
     left.axvline(1.0, color="#444444", linewidth=0.8)
     left.set_xlabel("error rate of a scenario, over that of all")
-    _named_points(right, [(f"{v.about}: {n}", p) for v in shares for n, p in v.numbers["shares"].items()])
+    _named_points(right, [(_of(v, shares, n), p) for v in shares for n, p in v.numbers["shares"].items()])
     right.set_xlabel("share of errors")
-    figure.suptitle("Errors by scenario and by tag, 95 % over recordings", fontsize=10)
+    about = f"{verdicts[0].about}: " if len({verdict.about for verdict in verdicts}) == 1 else ""
+    figure.suptitle(f"{about}errors by scenario and by tag, 95 % over recordings", fontsize=10)
     return figure
+
+
+def _of(verdict: ClaimVerdict, verdicts: Sequence[ClaimVerdict], name: str) -> str:
+    """The name of a row, with the model where there are several."""
+    shown = name.replace("_", " ")
+    return f"{verdict.about}: {shown}" if len(verdicts) > 1 else shown
 
 
 def _named_points(axes: Axes, points: Sequence[tuple[str, Mapping[str, Any]]]) -> None:

@@ -12,6 +12,7 @@ from matplotlib.ticker import PercentFormatter
 from sdt_tools.error_analysis.compare.paired import Change, Measure
 
 _WORSE, _BETTER, _NEUTRAL = "#d1495b", "#2a9d8f", "#444444"
+_NAMES: Final = {"accuracy": "accuracy", "loss_ce": "cross-entropy", "forward_recall": "forward recall"}
 DPI: Final = 110
 
 
@@ -37,8 +38,9 @@ def _differences(axes: Axes, measures: dict[str, Measure]) -> None:
         axes.annotate(
             f"{one.value:+.3f}", (one.value, place), (0, 9), textcoords="offset points", ha="center", fontsize=8
         )
-    axes.set_yticks(range(len(measures)), [name.replace("_", " ") for name in measures])
+    axes.set_yticks(range(len(measures)), [_NAMES[name] for name in measures])
     axes.set_ylim(len(measures) - 0.4, -0.6)
+    axes.margins(x=0.15)
     axes.set_xlabel("difference (accuracy and recall in shares, loss in nats)")
     _tidy(axes)
 
