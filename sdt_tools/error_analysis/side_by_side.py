@@ -69,7 +69,9 @@ def load_side_by_side(paths: Sequence[Path], models: Sequence[str] = ()) -> Side
         if name not in held:
             raise UsageError(f"{where}: no predictions of model '{name}'; there are {', '.join(held)}")
     names = tuple(models) or tuple(held)
-    each = [_labelled(rows, name, where) for name in names]
+    everything = [name for name in rows.collect_schema().names() if name != "logits"]
+    answers = ["recording", *KEYS, "label", *_ANSWERS]
+    each = [_labelled(rows, name, answers if place else everything, where) for place, name in enumerate(names)]
     shared = each[0].select(*KEYS, "label")
     for other in each[1:]:
         shared = shared.join(other.select(*KEYS, "label"), on=[*KEYS, "label"], how="inner")
@@ -101,8 +103,9 @@ def load_side_by_side(paths: Sequence[Path], models: Sequence[str] = ()) -> Side
     )
 
 
-def _labelled(rows: pl.LazyFrame, model: str, where: str) -> pl.DataFrame:
-    frames = rows.filter((pl.col("model") == model) & pl.col("label").is_not_null()).drop("logits").collect()
+def _labelled(rows: pl.LazyFrame, model: str, columns: Sequence[str], where: str) -> pl.DataFrame:
+    """Those columns of the labelled frames of one model."""
+    frames = rows.filter((pl.col("model") == model) & pl.col("label").is_not_null()).select(columns).collect()
     if frames.is_empty():
         raise UsageError(
             f"{where}: none of the frames of '{model}' has a label, so none can be called wrong; "

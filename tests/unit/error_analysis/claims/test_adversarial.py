@@ -1,9 +1,12 @@
+from pathlib import Path
+
 import numpy as np
 import polars as pl
 import pytest
 from prediction_samples import OPTIONS, frames_table, side_by_side
 
 from sdt_tools.error_analysis.claims.adversarial import NOT_GIVEN, judge_adversarial, permutation_p
+from sdt_tools.error_analysis.claims.figures import draw_claims
 from sdt_tools.error_analysis.claims.verdict import ClaimVerdict, Finding
 from sdt_tools.error_analysis.side_by_side import KEYS
 
@@ -68,3 +71,9 @@ def test_untagged_errors_cannot_be_called_transient() -> None:
     verdict = judged(EVEN)["transient"]
     assert verdict.finding is Finding.UNDECIDED
     assert "--tags" in verdict.reason
+
+
+def test_both_are_drawn_in_one_picture(tmp_path: Path) -> None:
+    tags = np.where(EVEN, "transient", "correct")
+    assert draw_claims(list(judged(EVEN, tags).values()), None, tmp_path) == ("uniform.png",)
+    assert (tmp_path / "uniform.png").stat().st_size > 10_000
