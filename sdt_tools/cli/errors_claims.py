@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from sdt_tools.cli.console import JsonFlag, console, emit
+from sdt_tools.cli.console import JsonFlag, console, emit, print_incomplete
 
 if TYPE_CHECKING:
     from sdt_tools.error_analysis.claims.judge import ClaimReport
@@ -65,6 +65,7 @@ def command(
         emit({**report.document(), "out": str(out)})
         return
     _print(report)
+    print_incomplete(report.incomplete)
     console.print(f"written to {out}", soft_wrap=True)
 
 

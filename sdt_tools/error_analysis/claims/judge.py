@@ -39,6 +39,7 @@ from sdt_tools.error_analysis.side_by_side import KEYS, load_side_by_side
 from sdt_tools.errors import OutputExistsError, UsageError
 from sdt_tools.frames import MAX_RANGE_M, MotionClass
 from sdt_tools.models.checkpoint import load_checkpoint
+from sdt_tools.recording.incomplete import Incomplete
 from sdt_tools.runs.code import code_version
 from sdt_tools.runs.local import Progress
 from sdt_tools.runs.unit import content_hash
@@ -67,17 +68,19 @@ class Sources:
 
 @dataclass(frozen=True)
 class ClaimReport:
-    """All verdicts, on what they rest, and the options."""
+    """All verdicts, on what they rest, and the options; ``incomplete`` recordings were cut off or are damaged."""
 
     verdicts: tuple[ClaimVerdict, ...]
     summary: Mapping[str, Any]
     options: ClaimOptions
+    incomplete: tuple[Incomplete, ...]
 
     def document(self) -> dict[str, Any]:
         """As JSON-ready values."""
         return {
             "claims": [verdict.document() for verdict in self.verdicts],
             **self.summary,
+            "incomplete": [recording.document() for recording in self.incomplete],
             "options": self.options.model_dump(mode="json"),
         }
 
@@ -100,7 +103,7 @@ def judge_claims(sources: Sources, options: ClaimOptions, out: Path, progress: P
     material = gather(list(networks.values()), frames, options)
     tags = _read_tags(sources.tags)
     runs = _read_runs(sources.evaluations)
-    scans = _read_scans(material, sources.recordings, options, progress)
+    scans, incomplete = _read_scans(material, sources.recordings, options, progress)
     locality = None if scans is None else _locality(material, scans, options)
     adversarial = tuple(
         dict.fromkeys((*sources.adversarial, *(one.name for one in material.networks if one.adversarial)))
@@ -120,7 +123,7 @@ def judge_claims(sources: Sources, options: ClaimOptions, out: Path, progress: P
         *judge_adversarial(frames, adversarial, tags, options),
         *_judge_propositions(material, scans, options),
     )
-    report = ClaimReport(verdicts, _summary(material), options)
+    report = ClaimReport(verdicts, _summary(material), options, incomplete)
     _write(report, locality, sources, out)
     return report
 
@@ -160,10 +163,13 @@ def _read_runs(paths: Sequence[Path]) -> pl.DataFrame | None:
 
 def _read_scans(
     material: Material, recordings: Sequence[Path], options: ClaimOptions, progress: Progress | None
-) -> Float32[np.ndarray, "frames rays"] | None:
-    """The code-resolved scans of all frames, as far as the sensor sees; None without recordings."""
+) -> tuple[Float32[np.ndarray, "frames rays"] | None, tuple[Incomplete, ...]]:
+    """The code-resolved scans of all frames, as far as the sensor sees, and which recordings are cut off or damaged.
+
+    None without recordings.
+    """
     if not recordings:
-        return None
+        return None, ()
     frames = material.labelled(0, options)
     unclipped = options.errors.model_copy(update={"clip_m": MAX_RANGE_M})
     return read_situations(frames, find_recordings(frames, recordings), unclipped, progress)

@@ -9,9 +9,9 @@ from sdt_tools.error_analysis.definitions import ConditionOptions
 class CompareOptions(Config):
     """How models are compared.
 
-    ``lift``: conditions are sought inside which frames change (from right to wrong, or back) more than ``lift`` times as
-    often as over all frames; where that is more than half of the frames, half is enough. ``conditions``: how they are
-    searched and confirmed.
+    ``lift``: conditions are sought inside which frames change (from right to wrong, or back) more than ``lift`` times
+    as often as over all frames; where that is more than half of the frames, half is enough. ``conditions``: how they
+    are searched and confirmed.
     """
 
     resamples: int = Field(default=2000, ge=100)
