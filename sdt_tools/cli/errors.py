@@ -5,6 +5,7 @@ from typing import Annotated
 
 import typer
 
+from sdt_tools.cli import errors_claims, errors_compare
 from sdt_tools.cli.console import JsonFlag, console, emit, print_incomplete
 from sdt_tools.cli.default_command import WithDefault
 
@@ -13,6 +14,10 @@ app = typer.Typer(
     no_args_is_help=True,
     help="Say of every wrong frame why it is wrong. Without a sub-command named: analyse.",
 )
+
+
+app.command("claims")(errors_claims.command)
+app.command("compare")(errors_compare.command)
 
 
 @app.callback()
