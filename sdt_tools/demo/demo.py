@@ -56,7 +56,7 @@ def run_demo(out: Path, config: DemoConfig, workers: int, progress: StageProgres
     predictions = execute(Unit("replay", stages.replay_stage, replayed), out)
     progress("error tags", 0, 1)
     analysed = {"predictions": predictions, "recordings": (*practice, *camera), "options": config.errors}
-    errors = execute(Unit("errors", stages.errors_stage, analysed), out)
+    errors = execute(Unit("errors", stages.errors_stage, analysed, {"found_at": out / "errors"}), out)
     progress("Rerun view", 0, 1)
     shown = {"recording": camera[0], "labels": labels, "predictions": predictions, "errors": errors}
     view = execute(Unit("view", stages.view_stage, shown), out)

@@ -9,8 +9,8 @@ import rerun as rr
 from jaxtyping import Float64, Int64
 
 from sdt_tools.replay.tracks import PoseTrack
+from sdt_tools.top_view import Mount, distances, footprint_base, hits_lidar, lidar_poses, place, to_screen
 from sdt_tools.view import entities, palette
-from sdt_tools.view.geometry import Mount, distances, footprint_base, hits_lidar, lidar_poses, place, to_screen
 from sdt_tools.view.palette import Rgb
 from sdt_tools.view.scan_view import NORMAL, THIN
 from sdt_tools.view.timeline import When, send

@@ -6,8 +6,8 @@ import numpy as np
 import rerun as rr
 from jaxtyping import Float64
 
+from sdt_tools.top_view import arc, place, to_screen
 from sdt_tools.view import palette
-from sdt_tools.view.geometry import arc, place, to_screen
 from sdt_tools.view.scan_view import NORMAL
 from sdt_tools.view.timeline import When, send
 

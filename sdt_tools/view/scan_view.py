@@ -9,8 +9,7 @@ from jaxtyping import Float32, Float64
 
 from sdt_tools.config import MotionConfig
 from sdt_tools.frames import FIRST_RAY_RAD, MotionClass, ray_angles_rad
-from sdt_tools.view import entities, palette
-from sdt_tools.view.geometry import (
+from sdt_tools.top_view import (
     Mount,
     arc,
     base_to_lidar,
@@ -22,6 +21,7 @@ from sdt_tools.view.geometry import (
     safety_zone_lidar,
     to_screen,
 )
+from sdt_tools.view import entities, palette
 from sdt_tools.view.palette import Rgb
 from sdt_tools.view.timeline import When, send
 

@@ -13,10 +13,10 @@ from sdt_tools.clock import SECOND_NS
 from sdt_tools.config import MotionConfig
 from sdt_tools.recording.reader import Recording
 from sdt_tools.replay.tracks import Tracks, read_tracks
+from sdt_tools.top_view import lidar_poses, seen_from
 from sdt_tools.view import entities, palette
 from sdt_tools.view.camera_view import send_signals, style_signals
 from sdt_tools.view.decisions import Labels, ModelTrack, error_runs, labels_of, models_of
-from sdt_tools.view.geometry import lidar_poses, seen_from
 from sdt_tools.view.lanes import Lane, lanes_of, send_lanes
 from sdt_tools.view.map_view import draw_way, send_robot, style_robot
 from sdt_tools.view.notes import NOTE_TOPICS, Notes, read_notes
