@@ -3,7 +3,7 @@
 import json
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Final
+from typing import Any, Final
 
 import polars as pl
 
@@ -32,8 +32,8 @@ def write_tags(table: pl.LazyFrame, path: Path, made_from: Mapping[str, object])
     table.sink_parquet(path, compression="zstd", row_group_size=ROWS_A_GROUP, metadata=metadata)
 
 
-def read_made_from(path: Path) -> dict[str, object]:
+def read_made_from(path: Path) -> dict[str, Any]:
     """What a tags file says of itself; empty for files that say nothing."""
     found = pl.read_parquet_metadata(path).get(TAGS_KEY)
-    made_from: dict[str, object] = json.loads(found) if found else {}
+    made_from: dict[str, Any] = json.loads(found) if found else {}
     return made_from
