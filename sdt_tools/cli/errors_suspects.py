@@ -40,12 +40,15 @@ def command(
     are among them: people decide.
     """
     from sdt_tools.cli.progress import stage_progress
-    from sdt_tools.config import parse_config, read_toml
+    from sdt_tools.config import load_config, parse_config
     from sdt_tools.error_analysis.suspects.options import SuspectOptions
     from sdt_tools.error_analysis.suspects.run import LabelSource, write_suspect_labels
 
-    given = {name: value for name, value in (("folds", folds), ("epochs", epochs), ("seed", seed)) if value is not None}
-    options = parse_config(SuspectOptions, {**(read_toml(config) if config else {}), **given}, str(config or "options"))
+    values = load_config(SuspectOptions, config).model_dump(mode="json", exclude_none=True)
+    values |= {name: value for name, value in (("folds", folds), ("seed", seed)) if value is not None}
+    if epochs is not None:
+        values["training"]["loop"]["epochs"] = epochs
+    options = parse_config(SuspectOptions, values, "the options")
     source = LabelSource(dataset, recordings or [], labels, predictions or [], model)
     with stage_progress() as progress:
         report = write_suspect_labels(source, options, out, progress)

@@ -17,24 +17,22 @@ from sdt_tools.models.preprocess import resolve_codes
 from sdt_tools.runs.local import Progress
 from sdt_tools.training.augment import VariedBatches
 from sdt_tools.training.loop import Batch, run_loop
-from sdt_tools.training.recipes import recipe_for
-from sdt_tools.training.specification import SpecificationConfig
 
 
 def judge_held_out(scans: LabelledScans, options: SuspectOptions, progress: Progress | None = None) -> Judged:
-    """Train a follow network of level 0 a fold, on the labels as they are, and let it answer the fold's frames.
+    """Train a follow network a fold, on the labels of the others as they are, and let it answer the fold's frames.
 
     ``progress`` counts epochs over all folds. The same seed gives the same answers. Raises UsageError where there are
     fewer recordings than folds, RunError where a training diverges.
     """
     fold = folds_of(scans.keys, options)
     logits = np.empty((len(scans.labels), len(MotionClass)), np.float32)
-    epochs = options.folds * options.epochs
+    epochs = options.training.loop.epochs
     for number in range(options.folds):
 
-        def report(epoch: int, done: int = number * options.epochs) -> None:
+        def report(epoch: int, done: int = number * epochs) -> None:
             if progress:
-                progress(done + epoch, epochs)
+                progress(done + epoch, options.folds * epochs)
 
         held_out = fold == number
         logits[held_out] = _answers(scans, held_out, options, number, report)
@@ -74,13 +72,12 @@ def _answers(
     report: Callable[[int], None],
 ) -> Float32[np.ndarray, "held classes"]:
     """Logits of the frames ``held_out``, by a network trained on the others."""
-    config = recipe_for(SpecificationConfig(), "plain")
-    loop = config.loop.model_copy(update={"epochs": options.epochs, "extra_epochs": 0})
-    seed = options.seed * options.folds + fold
+    config = options.training
+    seed = (options.seed + config.seed) * options.folds + fold
     network = new_follow_net(config.architecture, config.preprocess, seed)
     ranges_m, labels = scans.ranges_m[~held_out].astype(np.float32), scans.labels[~held_out]
     batches = VariedBatches(ranges_m, labels, config.batch_size, config.augment, config.preprocess, seed)
     resolved = resolve_codes(scans.ranges_m[held_out].astype(np.float32), config.preprocess)
     validation = Batch(torch.from_numpy(resolved), torch.tensor(scans.labels[held_out]))
-    run_loop(network, batches, validation, loop, seed, lambda record: report(record.epoch))
+    run_loop(network, batches, validation, config.loop, seed, lambda record: report(record.epoch))
     return logits_of(network, scans.ranges_m[held_out])
