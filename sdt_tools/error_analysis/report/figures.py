@@ -40,13 +40,14 @@ def save_png(figure: Figure, path: Path) -> None:
     figure.savefig(path, dpi=DPI)
 
 
-def as_svg(figure: Figure) -> str:
-    """``figure`` as an SVG element without a background."""
+def as_svg(figure: Figure, name: str) -> str:
+    """``figure`` as an SVG element without a background; ``name`` keeps its ids apart from those of other figures."""
     with io.StringIO() as file, _style():
         figure.savefig(file, format="svg", transparent=True, metadata={"Date": None, "Creator": None})
         text = file.getvalue()
     text = re.sub(r"font: ([0-9.]+px) [^;\"]*", r"font: \1 system-ui, sans-serif", text[text.index("<svg") :])
     text = re.sub(r"<metadata>.*?</metadata>", "", text, flags=re.DOTALL)
+    text = re.sub(r'((?: id="|url\(#|href="#))', rf"\1{name}-", text)
     return text.replace(_INK, "currentColor")
 
 

@@ -66,9 +66,9 @@ def render_page(
             report=report,
             tags=[(str(tag), report.tags[tag]) for tag in Tag],
             widest=max([report.tags[tag].high for tag in ERROR_TAGS] + [0.01]),
-            epsilon_svg=Markup(as_svg(epsilon_figure(report.epsilon))),  # noqa: S704 - drawn here
+            epsilon_svg=Markup(as_svg(epsilon_figure(report.epsilon), "epsilon")),  # noqa: S704 - drawn here
             bounds={
-                number: _bounds(condition.verdict.condition, features, frames)
+                number: _bounds(number, condition.verdict.condition, features, frames)
                 for number, condition in enumerate(report.conditions, start=1)
             },
             parts={"scenario": parts_by("scenario", tagged), "right answer": parts_by("label", tagged)},
@@ -118,16 +118,16 @@ def _clock(stamp_ns: int) -> str:
     return f"{moment:%Y-%m-%d %H:%M:%S}.{stamp_ns % SECOND_NS // 1_000_000:03d}"
 
 
-def _bounds(condition: Condition, features: Features, frames: LabelledFrames) -> list[Markup]:
+def _bounds(number: int, condition: Condition, features: Features, frames: LabelledFrames) -> list[Markup]:
     """A picture for each bound: the errors over its feature, among the frames that the rest of the condition holds."""
     pictures = []
-    for predicate in condition.predicates:
+    for place, predicate in enumerate(condition.predicates):
         if isinstance(predicate.value, str) or predicate.feature not in features.numeric:
             continue
         others = _without_feature(condition, predicate).mask(features)
         values = features.numeric[predicate.feature][others]
         figure = bound_figure(predicate, values, frames.wrong[others])
-        pictures.append(Markup(as_svg(figure)))  # noqa: S704 - drawn here
+        pictures.append(Markup(as_svg(figure, f"bound-{number}-{place}")))  # noqa: S704 - drawn here
     return pictures
 
 
