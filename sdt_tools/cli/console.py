@@ -11,7 +11,8 @@ from rich.console import Console
 
 JsonFlag = Annotated[bool, typer.Option("--json", help="Print one JSON document on stdout.")]
 
-console = Console(stderr=True, highlight=False)
+console = Console(stderr=True, highlight=False, markup=False)
+"""Names of files may hold brackets, so that nothing in them is markup."""
 
 
 def emit(document: Mapping[str, Any]) -> None:

@@ -72,7 +72,7 @@ def build(
     given = {name: value for name, value in options.items() if value is not None}
     file_values = {} if config is None else read_toml(config)
     settings = parse_config(DatasetConfig, file_values, str(config))
-    settings = parse_config(DatasetConfig, file_values | given, "the options")
+    settings = parse_config(DatasetConfig, file_values | given, "the options", {name: _option(name) for name in given})
     with progress_bar("reading recordings") as report:
         check = conflict_check(settings.conflict_level)
         summary = build_dataset(recordings, labels, settings, out, check, report, validation or ())
@@ -80,6 +80,10 @@ def build(
         emit(_document(summary))
     else:
         _show(summary)
+
+
+def _option(setting: str) -> str:
+    return f"--{setting.replace('_', '-')}"
 
 
 def _document(summary: "DatasetSummary") -> dict[str, object]:

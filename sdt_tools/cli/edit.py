@@ -127,9 +127,9 @@ def _carry_out(plan: "Cut | Merge", labels: Path, json_output: bool) -> None:
 
 
 def _print(edited: "tuple[EditedRecording, ...]", journals: "tuple[FollowedJournal, ...]") -> None:
-    from rich.table import Table
+    from rich.table import Column, Table
 
-    table = Table("recording", "seconds", "messages", "carried to the beginning")
+    table = Table(Column("recording", overflow="fold"), "seconds", "messages", "carried to the beginning")
     for new in edited:
         table.add_row(str(new.out), f"{new.seconds:.3f}", f"{sum(new.messages.values()):,}", str(len(new.carried)))
     console.print(table)

@@ -71,5 +71,5 @@ def analyse(
     else:
         console.print(report.note or "no condition was confirmed")
     for warning in report.warnings:
-        console.print(f"[yellow]{warning}")
+        console.print(warning, style="yellow")
     console.print(f"written to {out}; read {out / 'report.html'}", soft_wrap=True)

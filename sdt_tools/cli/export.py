@@ -62,4 +62,4 @@ def _report(summary: "ExportSummary", json_output: bool) -> None:
     if summary.truncated:
         console.print("cut off: the recording has no end; what could be read went out")
     for damage in summary.damage:
-        console.print(f"damaged: from {damage.start_ns} to {damage.end_ns} ns: {damage.reason}")
+        console.print(f"damaged: from {damage.start_ns} to {damage.end_ns} ns: {damage.reason}", soft_wrap=True)

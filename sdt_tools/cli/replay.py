@@ -39,8 +39,6 @@ def command(
     if json_output:
         emit({**vars(summary), "frames_per_s": round(summary.frames_per_s), "accuracy": summary.accuracy})
         return
-    from rich.markup import escape
-
     console.print(
         f"{summary.frames:,} frames of {summary.recordings} recordings answered by {summary.model} "
         f"({summary.frames_per_s:,.0f} a second): {summary.out}",
@@ -56,6 +54,6 @@ def command(
         ("with damaged chunks", summary.damaged),
     ):
         if names:
-            console.print(f"[yellow]{what}: {escape(', '.join(names))}")
+            console.print(f"{what}: {', '.join(names)}", style="yellow", soft_wrap=True)
     if summary.labels_without_scan:
-        console.print(f"[yellow]{summary.labels_without_scan} labels lie at stamps without a scan")
+        console.print(f"{summary.labels_without_scan} labels lie at stamps without a scan", style="yellow")

@@ -79,7 +79,7 @@ def command(
         soft_wrap=True,
     )
     if summary.truncated:
-        console.print("[yellow]the recording was cut off; it is shown as far as it goes")
+        console.print("the recording was cut off; it is shown as far as it goes", style="yellow")
     if errors:
         _list_errors(summary, " or ".join(tag or []))
     if not open_:

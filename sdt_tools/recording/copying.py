@@ -11,6 +11,7 @@ from sdt_tools.errors import OutputExistsError, RecordingError
 from sdt_tools.recording.container.file import McapFile
 from sdt_tools.recording.container.reader import McapReader, RawEntry
 from sdt_tools.recording.messages.topics import CAMERA_IMAGE
+from sdt_tools.recording.scratch import scratch_file
 from sdt_tools.recording.session import SOFTWARE
 
 
@@ -58,17 +59,14 @@ class RecordCopy:
 
 
 @contextmanager
-def new_file(out: Path) -> Iterator[McapFile]:
+def new_file(out: Path, profile: str = "") -> Iterator[McapFile]:
     """A file to be written at ``out``, which appears there only when it is finished and another reader has read it.
 
     Raises OutputExistsError where ``out`` exists, RecordingError where the disk refuses or what was written does not
     read back; then nothing is left at ``out``.
     """
-    if out.exists():
-        raise OutputExistsError(out)
-    part = out.with_name(f".{out.name}.part")
-    part.unlink(missing_ok=True)
-    file = McapFile(part, SOFTWARE)
+    part = scratch_file(out)
+    file = McapFile(part, SOFTWARE, profile=profile)
     try:
         yield file
         file.finish()

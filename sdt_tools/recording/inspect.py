@@ -123,12 +123,12 @@ def inspect_recording(path: Path, full: bool = False) -> InspectReport:
 def draw_timing(report: InspectReport, out: Path) -> None:
     """Draw the timing of the recording that ``report`` is of to the PNG ``out``; all its messages are counted for it.
 
-    Raises OutputExistsError where ``out`` exists, RunError where it cannot be written.
+    Raises OutputExistsError where ``out`` exists, DiskRefusedError where it cannot be written.
     """
     from sdt_tools.recording.timing.figure import timing_figure  # matplotlib takes a while to import
 
     if out.exists():
-        raise OutputExistsError(out)
+        raise OutputExistsError(out, "--plot")
     with Recording.open(report.path) as recording:
         stamps = recording.stamps()
     title = f"{report.path.name}: {report.duration_s:.1f} s, {report.health}"

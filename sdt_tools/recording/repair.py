@@ -10,6 +10,7 @@ from sdt_tools.errors import RecordingError
 from sdt_tools.recording.container.reader import Damage, McapReader
 from sdt_tools.recording.copying import RecordCopy, new_file
 from sdt_tools.recording.messages.topics import is_ours
+from sdt_tools.recording.reader import decoded
 from sdt_tools.recording.session import STATS
 from sdt_tools.recording.timing.pauses import pauses_of
 from sdt_tools.recording.timing.stamps import StampLog
@@ -58,7 +59,7 @@ def repair_recording(path: Path, out: Path) -> RepairReport:
     Raises OutputExistsError where ``out`` exists; RecordingError for a path that is missing or not an MCAP, that holds
     nothing to save, and where the repaired file does not read back: then there is none.
     """
-    with McapReader(path) as source, new_file(out) as file:
+    with McapReader(path) as source, new_file(out, source.profile) as file:
         copy = RecordCopy(file)
         for attached in source.attachments():
             file.add_attachment(attached.name, attached.media_type, attached.data, attached.log_time)
@@ -69,6 +70,8 @@ def repair_recording(path: Path, out: Path) -> RepairReport:
             copy.announce(source, channel)
         ours, stamps = _our_topics(source), StampLog()
         for entry in source.entries():
+            if entry.channel_id in ours and not source.is_checked(entry.offset) and decoded(source, entry) is None:
+                continue  # in the new file a checksum would vouch for it
             copy.take(source, entry)
             if entry.channel_id in ours:
                 stamps.see(ours[entry.channel_id], entry.log_ns, entry.publish_ns)

@@ -123,7 +123,7 @@ def test_takes_under_single_keys(tmp_path: Path, at_terminal: Callable[..., Term
     assert messages_in(folder / "take_001.mcap") == first["messages"]
     assert messages_in(folder / str(second["trash"]) / "take_002.mcap") == second["messages"]
     with Recording.open(folder / "take_001.mcap") as recording:
-        assert "mark 1" in [m.message.text for m in recording.messages(["/session/log"])]  # type: ignore[union-attr]
+        assert "mark 1" in [m.message.text for m in recording.messages(["/session/log"])]
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])

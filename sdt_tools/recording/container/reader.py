@@ -1,20 +1,23 @@
 """An MCAP file of anyone's, read: streaming, memory-mapped, a chunk at a time.
 
 Whole files are read by their summary, files that were cut off as far as they go (``truncated``). A chunk that is
-damaged costs itself: what it held is missing, the rest is read, and ``damage`` names the interval.
+damaged costs itself: what it held is missing, the rest is read, and ``damage`` names the interval. So does a message
+that is damaged, where whoever knows what it means says so (``lose``).
 """
 
 import contextlib
 import logging
 import mmap
+import struct
 from collections.abc import Iterator, Mapping, Set
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise
 from pathlib import Path
 from types import TracebackType
-from typing import NamedTuple
+from typing import Final, NamedTuple
 
+from mcap.opcode import Opcode
 from mcap.records import Attachment, Channel, Metadata, Schema
 
 from sdt_tools.errors import RecordingError
@@ -24,6 +27,7 @@ from sdt_tools.recording.container.chunk import (
     RawMessage,
     Segment,
     ends_within_a_record,
+    is_checked,
     read_segment,
     walk_messages,
 )
@@ -33,6 +37,9 @@ from sdt_tools.recording.container.index import read_index
 from sdt_tools.recording.container.records import HEAD, FileIndex
 
 _log = logging.getLogger(__name__)
+_HEADER: Final = struct.Struct("<BQI")  # opcode, length of the record, length of the profile
+_HEADER_END: Final = len(MAGIC) + _HEADER.size
+_LONGEST_PROFILE: Final = 256
 
 
 @dataclass(frozen=True)
@@ -72,6 +79,7 @@ class McapReader:
         self._map = _map_file(path)
         self._view = memoryview(self._map)
         self._damage: dict[tuple[int, str], Damage] = {}
+        self._lost: dict[tuple[int, str], dict[int, int]] = {}
         self._index: FileIndex = read_index(self._view)
 
     def close(self) -> None:
@@ -99,6 +107,13 @@ class McapReader:
         return self._view[: 1 << 20]
 
     @property
+    def profile(self) -> str:
+        """Whose conventions the file says it keeps, as ``ros2``; empty where it says none, or its header is damaged."""
+        opcode, _, length = _HEADER.unpack_from(self._view, len(MAGIC)) if len(self._view) >= _HEADER_END else (0, 0, 0)
+        known = opcode == Opcode.HEADER and length <= _LONGEST_PROFILE
+        return bytes(self._view[_HEADER_END : _HEADER_END + length]).decode(errors="replace") if known else ""
+
+    @property
     def truncated(self) -> bool:
         """Whether the file ends before its footer: a recording that was cut off, or is still being written."""
         return self._index.truncated
@@ -110,6 +125,8 @@ class McapReader:
         if bytes(self._view[: len(MAGIC)]) != MAGIC:
             skipped.append(_harmless("the file's first bytes are not those of an MCAP"))
         skipped += map(_harmless, self._index.harmless)
+        for (_, reason), lost in self._lost.items():
+            skipped.append(Damage(min(lost.values()), max(lost.values()), f"{len(lost)} {reason}"))
         return tuple(sorted([*skipped, *self._damage.values()], key=lambda damage: damage.start_ns))
 
     @property
@@ -207,6 +224,20 @@ class McapReader:
             reason = "a record in it is longer than it is; what follows that record is lost"
             self._note(segment.offset, reason, segment.start_ns, segment.end_ns)
         return data
+
+    def is_checked(self, offset: int) -> bool:
+        """Whether a checksum vouches for what is read of the segment at ``offset``."""
+        return is_checked(self._view, offset)
+
+    def lose(self, offset: int, place: int, log_ns: int, reason: str) -> None:
+        """Name in ``damage`` a message that was found and is not what it should be; it counts once, however often read.
+
+        It begins at ``place`` in the segment at ``offset``; ``reason`` says in the plural what such messages are.
+        """
+        lost = self._lost.setdefault((offset, reason), {})
+        if not lost:
+            _log.warning("%s: damaged at byte %d: %s; the first at %d ns", self.path, offset, reason, log_ns)
+        lost[place] = log_ns
 
     def _entries(
         self, segment: Segment, wanted: frozenset[int], start_ns: int | None, end_ns: int | None

@@ -26,7 +26,7 @@ class Cutter:
         """Write ``part`` at ``path``; all messages as they are, before them what holds from before."""
         source, cut = self._source, self._cut
         recording_id = _part_id(recording_id_of(source), cut, part)
-        with new_file(path) as file:
+        with new_file(path, source.profile) as file:
             write_beginning(file, [source], recording_id)
             copy = RecordCopy(file)
             for number in self._kept:

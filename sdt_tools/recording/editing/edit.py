@@ -12,6 +12,7 @@ from sdt_tools.recording.editing.cutting import Cutter
 from sdt_tools.recording.editing.merging import write_merged
 from sdt_tools.recording.editing.plan import Cut, Merge
 from sdt_tools.recording.editing.provenance import EditedRecording
+from sdt_tools.recording.scratch import scratch_folder
 
 
 @dataclass(frozen=True)
@@ -38,9 +39,7 @@ def edit_under_way(plan: Cut | Merge) -> Iterator[tuple[Finished, ...]]:
 
     Raises as ``edit_recordings``.
     """
-    first = plan.outs[0]
-    scratch = first.with_name(f".{first.name}.edit")
-    shutil.rmtree(scratch, ignore_errors=True)  # of an edit that was interrupted
+    scratch = scratch_folder(plan.outs[0], "edit", plan.out_option)
     try:
         finished = _written(plan, scratch)
         yield finished

@@ -34,7 +34,8 @@ def write_merged(plan: Merge, path: Path) -> EditedRecording:
         wholes = [whole_span(source) for source in sources]
         carried = [carried_in(source) for source in sources]
         needless = _needless(sources, carried)
-        with new_file(path) as file:
+        profiles = {source.profile for source in sources}
+        with new_file(path, profiles.pop() if len(profiles) == 1 else "") as file:
             write_beginning(file, sources, recording_id)
             copy = RecordCopy(file)
             for source in sources:

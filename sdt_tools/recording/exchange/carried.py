@@ -12,13 +12,12 @@ from typing import Any, NamedTuple
 from google.protobuf.message import DecodeError
 
 from sdt_tools.clock import SECOND_NS
-from sdt_tools.errors import RecordingError
 from sdt_tools.recording.container.file import McapFile
 from sdt_tools.recording.container.reader import Damage, McapReader
 from sdt_tools.recording.exchange.about import About
 from sdt_tools.recording.messages.schemas import message_class, schema_data
 from sdt_tools.recording.messages.topics import CAMERA_IMAGE, TOPIC_BY_NAME, Topic, is_ours
-from sdt_tools.recording.reader import Recording
+from sdt_tools.recording.reader import Recording, not_valid
 from sdt_tools.recording.session import CONFIG_MEDIA_TYPE, CONFIG_NAME, SESSION, STATS
 
 
@@ -73,17 +72,15 @@ class Outgoing:
         return counts
 
     def messages(self) -> Iterator[Carried]:
-        """All messages of our topics in order of receipt; RecordingError for one that does not parse."""
+        """All messages of our topics in order of receipt; one that does not parse stays behind, named in ``damage``."""
         ours = self._ours()
         for entry in self._file.entries(frozenset(ours)):
             topic = ours[entry.channel_id]
             try:
                 message = message_class(topic.schema).FromString(entry.data)
             except DecodeError:
-                raise RecordingError(
-                    f"{self.path}: {topic.name} at {entry.publish_ns} ns: not a valid {topic.schema}; "
-                    "the data is damaged, `sdt repair` saves the rest"
-                ) from None
+                self._file.lose(entry.offset, entry.start, entry.log_ns, not_valid(topic.name, topic.schema))
+                continue
             yield Carried(topic, entry.log_ns, entry.publish_ns, message)
 
     def _ours(self) -> Mapping[int, Topic]:

@@ -21,6 +21,7 @@ from sdt_tools.clock import FAST_EPOCH_NS, SECOND_NS
 from sdt_tools.errors import OutputExistsError, RecordingError, UsageError
 from sdt_tools.frames import RAYS, LidarScan, LogEntry, LogLevel, Received
 from sdt_tools.protocols import SourceInfo
+from sdt_tools.recording.scratch import scratch_file
 from sdt_tools.recording.writer import RecordingWriter
 
 COLUMNS: Final = RAYS + 4
@@ -52,9 +53,8 @@ def import_lidar_csv(path: Path, out: Path, hz: float) -> ImportSummary:
         raise OutputExistsError(out)
     notes = {"import_file": path.name, "import_sha256": _sha256(path), "import_hz": f"{hz:g}"}
     info = SourceInfo("import", devices={"lidar": "SICK LMS1xx", "base": "Pioneer P3-AT"})
-    scratch = out.with_name(f".{out.name}.part")
-    scratch.unlink(missing_ok=True)
     scans = codes = 0
+    scratch = scratch_file(out)
     try:
         with RecordingWriter(scratch, info, "", notes=notes) as writer:
             writer.write(Received(FAST_EPOCH_NS, LogEntry(FAST_EPOCH_NS, LogLevel.INFO, _LEFT_OUT, "import")))

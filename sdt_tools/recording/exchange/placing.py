@@ -5,24 +5,20 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-from sdt_tools.errors import DiskRefusedError, OutputExistsError, RecordingError
+from sdt_tools.errors import DiskRefusedError, OutputExistsError
+from sdt_tools.recording.scratch import scratch_folder
 
 
 @contextmanager
 def placed(out: Path, inner: str) -> Iterator[Path]:
     """A path called ``inner`` in a hidden folder beside ``out``; what is made there becomes ``out`` at the end.
 
-    Raises OutputExistsError where ``out`` exists, DiskRefusedError naming it where the disk refuses; then nothing is
-    left.
+    Raises OutputExistsError where ``out`` exists, RecordingError naming it where it cannot be made, DiskRefusedError
+    where the disk refuses; then nothing is left.
     """
     if out.exists():
         raise OutputExistsError(out)
-    scratch = out.with_name(f".{out.name}.part")
-    try:
-        shutil.rmtree(scratch, ignore_errors=True)
-        scratch.mkdir(parents=True)
-    except OSError as error:
-        raise RecordingError(f"{out}: cannot be made: {error.strerror}; choose another --out") from None
+    scratch = scratch_folder(out, "part")
     try:
         made = scratch / inner
         yield made

@@ -11,6 +11,7 @@ from sdt_tools.frames import LogEntry, Received
 from sdt_tools.protocols import Actuator, Driver, Expert, Observer, Source
 from sdt_tools.recording.live.decide import Deciders, DecisionLoop, Perturb
 from sdt_tools.recording.live.disk import DiskWatch
+from sdt_tools.recording.live.encoder import Encode, PictureEncoder, encode_jpeg
 from sdt_tools.recording.live.interrupt import Interrupt, deferred_interrupt
 from sdt_tools.recording.live.loop import LiveLoop
 from sdt_tools.recording.live.outcome import Ending, RecordingProgress, RecordingSummary
@@ -39,14 +40,16 @@ def record(
     interrupt: Interrupt | None = None,
     limits: QueueLimits | None = None,
     disk: DiskWatch | None = None,
+    encode: Encode = encode_jpeg,
 ) -> RecordingSummary:
     """Record ``source`` for ``seconds`` (without, until it ends) while ``driver`` moves ``actuator``.
 
     The source is read in ticks of one scan period; with ``realtime`` ticks keep the pace of ``clock``, the host's
-    unless another is given, and a thread of its own writes: what it cannot keep up with is dropped as ``pressure``
-    says, and the recording ends before the ``disk`` is full. Ctrl-C, SIGTERM and SIGHUP end the recording as if its
-    time were up, and the summary says so; ``interrupt`` is what hears them, where the caller listens already. On every
-    way out the robot is told to stand still, and source and observers are closed; the writer is the caller's to close.
+    unless another is given, a thread of its own writes and another one encodes raw pictures by ``encode``: what they
+    cannot keep up with is dropped as ``pressure`` says, and the recording ends before the ``disk`` is full. Ctrl-C,
+    SIGTERM and SIGHUP end the recording as if its time were up, and the summary says so; ``interrupt`` is what hears
+    them, where the caller listens already. On every way out the robot is told to stand still, and source and observers
+    are closed; the writer is the caller's to close.
 
     Raises RunError where the source fails, after a word in ``/session/log``; RecordingError where the disk refuses.
     """
@@ -58,7 +61,8 @@ def record(
         return Tally(decisions.decisions, decisions.forced, pace.missed + decisions.missed)
 
     recorder = _OneTake(Take(sink, source.start_ns, seconds, rates, tally), writer)
-    loop = LiveLoop(source, actuator, decisions, pace, observers, recorder, progress)
+    encoder = PictureEncoder(realtime, limits, encode)
+    loop = LiveLoop(source, actuator, decisions, pace, observers, recorder, progress, encoder)
     try:
         if interrupt is not None:
             loop.run(interrupt)
@@ -91,9 +95,13 @@ class _OneTake:
         """Into the take."""
         self._take.write(received)
 
-    def missing(self, received: Received) -> int:
+    def drop(self, topic: str, received_ns: int) -> None:
         """From the take."""
-        return self._take.missing(received)
+        self._take.drop(topic, received_ns)
+
+    def missing(self, topic: str, stamp_ns: int) -> int:
+        """From the take."""
+        return self._take.missing(topic, stamp_ns)
 
     def tick(self, now_ns: int) -> Iterator[LogEntry]:
         """Watch the writer and the disk."""

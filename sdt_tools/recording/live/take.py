@@ -11,7 +11,7 @@ from sdt_tools.recording.live.disk import DiskSpace
 from sdt_tools.recording.live.gaps import GapCounter
 from sdt_tools.recording.live.outcome import Ending, RecordingProgress, RecordingSummary
 from sdt_tools.recording.live.sink import Sink
-from sdt_tools.recording.messages.topics import CAMERA_IMAGE, LIDAR_SCAN, topic_of
+from sdt_tools.recording.messages.topics import CAMERA_IMAGE, LIDAR_SCAN
 
 
 @dataclass(frozen=True)
@@ -85,15 +85,20 @@ class Take:
         if not self.paused:
             self.sink.write(received)
 
-    def missing(self, received: Received) -> int:
-        """Take note of a message that has passed; how many are missing from the recording just before it."""
-        gap = self._gaps.get(topic_of(received.message).name)
+    def drop(self, topic: str, received_ns: int) -> None:
+        """Count a message that was given up before it could be recorded, unless paused."""
+        if not self.paused:
+            self.sink.drop(topic, received_ns)
+
+    def missing(self, topic: str, stamp_ns: int) -> int:
+        """Take note of a message that has passed or was dropped; how many never came just before it."""
+        gap = self._gaps.get(topic)
         if gap is None:
             return 0
         if self.paused:
-            gap.pass_over(received.message.stamp_ns)
+            gap.pass_over(stamp_ns)
             return 0
-        return gap.see(received.message.stamp_ns)
+        return gap.see(stamp_ns)
 
     def pause(self, now_ns: int) -> None:
         """Leave out what comes from ``now_ns`` on."""

@@ -35,7 +35,7 @@ def by_protobuf(path: Path) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
 def foreign(path: Path, messages: list[Received], *, extra: bool = False, **options: object) -> Path:
     """The same messages in a file that the mcap package writes."""
     with path.open("wb") as file:
-        writer = Writer(file, **options)  # type: ignore[arg-type]
+        writer = Writer(file, **options)
         writer.start()
         channels: dict[str, int] = {}
         if extra:
@@ -98,7 +98,7 @@ def test_scans_of_one_chunk_come_in_order_of_receipt(tmp_path: Path) -> None:
     with Recording.open(write(tmp_path / "r.mcap", [scan(n) for n in (3, 1, 2, 0)])) as recording:
         series = recording.scans()
     assert list(series.stamps_ns) == [T0 + n * 20_000_000 for n in range(4)]
-    assert np.array_equal(series.ranges_m[1], scan(1).message.ranges_m)  # type: ignore[union-attr]
+    assert np.array_equal(series.ranges_m[1], scan(1).message.ranges_m)
 
 
 def test_messages_of_chosen_topics_in_a_half_open_interval(tmp_path: Path) -> None:
@@ -242,7 +242,7 @@ def test_files_of_other_writers_are_read(tmp_path: Path, options: dict[str, obje
         assert recording.session == {}
         assert len(recording.recording_id) == 36
     assert np.array_equal(series.stamps_ns, [T0 + n * 20_000_000 for n in range(200)])
-    assert np.array_equal(series.ranges_m[7], scan(7).message.ranges_m)  # type: ignore[union-attr]
+    assert np.array_equal(series.ranges_m[7], scan(7).message.ranges_m)
 
 
 def test_chunks_of_others_that_overlap_in_time_are_put_in_order(tmp_path: Path) -> None:
@@ -257,7 +257,7 @@ def test_chunks_of_others_that_overlap_in_time_are_put_in_order(tmp_path: Path) 
 def test_scans_of_another_number_of_rays_are_refused(tmp_path: Path) -> None:
     path = write(tmp_path / "r.mcap", [scan(0), scan(1, rays=1081)])
     with Recording.open(path) as recording:
-        assert [m.message.ranges_m.size for m in recording.messages()] == [541, 1081]  # type: ignore[union-attr]
+        assert [m.message.ranges_m.size for m in recording.messages()] == [541, 1081]
         with pytest.raises(RecordingError, match=r"r\.mcap: /lidar/scan at \d+ ns has 1081 rays, 541 expected"):
             recording.scans()
 

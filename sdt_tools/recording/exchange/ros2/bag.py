@@ -1,24 +1,28 @@
 """ROS 2 bags, opened: folders with their ``metadata.yaml``, or a single ``.mcap`` or ``.db3``."""
 
 import hashlib
+import sqlite3
 from collections.abc import Collection, Iterator, Mapping
 from contextlib import closing, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
 
-from rosbags.rosbag2 import Reader
+from rosbags.rosbag2 import Reader, ReaderError
 from ruamel.yaml import YAML
 
 from sdt_tools.errors import RecordingError, SdtError
+from sdt_tools.recording.container.file import MAGIC
 from sdt_tools.recording.container.reader import McapReader
 from sdt_tools.recording.exchange.about import About, about_from
 from sdt_tools.recording.exchange.ros2.routes import BagTopic
 
 METADATA: Final = "metadata.yaml"
-_STORAGE: Final = (".db3", ".mcap")
+_STORAGE: Final = {".db3": b"SQLite format 3\0", ".mcap": MAGIC}
+"""How files of a bag end, and how they begin."""
 _COMPRESSED: Final = ".zstd"
 _INFORMATION: Final = "rosbag2"
+_ADVICE: Final = "`sdt repair` saves what can be read of a bag's .mcap, `ros2 bag reindex` makes new metadata"
 
 
 @dataclass(frozen=True)
@@ -103,6 +107,9 @@ def _check(path: Path) -> None:
         raise RecordingError(f"{path}: not a ROS 2 bag; give its folder, or a .db3 or .mcap file")
     if path.stat().st_size == 0:
         raise RecordingError(f"{path}: is empty; nothing was recorded")
+    with path.open("rb") as file:
+        if not file.read(16).startswith(_STORAGE[path.suffix]):
+            raise RecordingError(f"{path}: not a ROS 2 bag, whatever its name says; give a bag's folder or file")
 
 
 @contextmanager
@@ -113,12 +120,14 @@ def _refusals(path: Path) -> Iterator[None]:
     except SdtError:
         raise
     except Exception as error:
-        reason = " ".join(str(error).split()).rstrip(".") or type(error).__name__
+        reason = " ".join(str(error).split()).rstrip(".")
+        if (
+            not isinstance(error, ReaderError | OSError | sqlite3.Error) or not reason
+        ):  # it has stumbled over bytes: what it says of them is noise
+            reason = "it ends too early, or its bytes make no sense"
         if "Profile is not ros2" in reason:
             raise RecordingError(f"{path}: an MCAP, but not of ROS 2; `sdt inspect` says what it is") from None
-        raise RecordingError(
-            f"{path}: cannot be read as a ROS 2 bag: {reason}; the bag is damaged or unfinished"
-        ) from None
+        raise RecordingError(f"{path}: a ROS 2 bag that is damaged or unfinished: {reason}; {_ADVICE}") from None
 
 
 def _yaml(path: Path) -> Mapping[str, Any]:
