@@ -33,7 +33,10 @@ def command(
     ] = None,
     tag: Annotated[
         list[str] | None,
-        typer.Option(help="Step through the errors of this tag alone, such as transient; may be given several times."),
+        typer.Option(
+            help="Step through the errors of this tag alone, such as transient, beginning at the first; may be given "
+            "several times."
+        ),
     ] = None,
     at: Annotated[
         int | None, typer.Option(metavar="STAMP_NS", help="With --open: begin at this stamp, in nanoseconds.")

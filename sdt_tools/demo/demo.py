@@ -18,6 +18,7 @@ from sdt_tools.demo import stages
 from sdt_tools.demo.config import DemoConfig
 from sdt_tools.demo.report import write_report
 from sdt_tools.demo.summary import DemoSummary
+from sdt_tools.error_analysis.analyse import PAGE
 from sdt_tools.evaluation.evaluate import EvaluationSummary, evaluate_follow
 from sdt_tools.evaluation.figure import runs_figure
 from sdt_tools.evaluation.saving import SaveRuns
@@ -165,7 +166,8 @@ def _figures(
         pl.read_parquet(table).filter(pl.col("policy") == name) for table in (evaluation.runs, evaluation.traces)
     )
     runs_figure(runs, traces, config.scenario, f"{stages.MODEL} in {config.scenario}", driven)
-    return {**{name: target for name, (_, target) in figures.items()}, "runs": driven}
+    page = errors / stages.ERRORS / PAGE
+    return {**{name: target for name, (_, target) in figures.items()}, "runs": driven, "page": page}
 
 
 def _summary(

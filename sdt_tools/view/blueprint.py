@@ -18,7 +18,7 @@ class Content:
     """What there is to show.
 
     ``reach_m``: how far the scan is shown at first; ``map_bounds``: None without odometry; ``errors``: whether there
-    are some to step through.
+    are some to step through, and ``stepping``: whether the view begins at the first of them.
     """
 
     reach_m: float
@@ -28,6 +28,7 @@ class Content:
     losses: bool = False
     log: bool = False
     errors: bool = False
+    stepping: bool = False
     map_bounds: Bounds | None = None
 
 
@@ -60,8 +61,8 @@ def blueprint(content: Content) -> rrb.Blueprint:
 
 
 def _time_panel(content: Content) -> rrb.TimePanel:
-    """Where there are errors, it begins at the first and waits."""
-    if content.errors:
+    """Where one steps from error to error, it begins at the first and waits."""
+    if content.errors and content.stepping:
         return rrb.TimePanel(timeline=ERROR, state="collapsed", play_state="paused", fps=1.0)
     return rrb.TimePanel(timeline=TIME, state="collapsed")
 

@@ -68,8 +68,9 @@ def write_rrd(
 
     ``labels`` are resolved (stamp_ns, label); ``predictions`` and ``tags`` have the columns of prediction files and of
     tag files, of any number of models and recordings: rows of other recordings are passed over. The first model colours
-    the scans. Errors with one of the tags ``step_tags`` (all without) can be stepped through. ``every`` shows one scan
-    in so many; ``motions`` shapes the arrows.
+    the scans. Errors with one of the tags ``step_tags`` can be stepped through, and the view begins at the first;
+    without, all errors can, and it begins with the recording. ``every`` shows one scan in so many; ``motions`` shapes
+    the arrows.
 
     Raises OutputExistsError; UsageError for ``every`` below 1 and for predictions of which none is about ``recording``;
     RecordingError where there is nothing to read; RunError where the disk does not take it all.
@@ -128,6 +129,7 @@ def _content(source: Recording, story: Story) -> Content:
         losses=has_losses(story),
         log=has_log(story),
         errors=bool(story.steps),
+        stepping=story.stepping,
         map_bounds=map_bounds([robot, operator]) if len(robot.stamps_ns) else None,
     )
 

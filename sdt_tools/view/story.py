@@ -43,7 +43,8 @@ TRUTH_NS: Final = SECOND_NS // 25
 class Story:
     """What is known of a recording, besides scans and images themselves.
 
-    ``steps`` are the errors to step through; ``elsewhere`` counts the like in other recordings.
+    ``steps`` are the errors to step through, and ``stepping`` whether that is what was asked for; ``elsewhere`` counts
+    the like in other recordings.
     """
 
     scans: Survey
@@ -54,6 +55,7 @@ class Story:
     lanes: tuple[Lane, ...]
     motions: MotionConfig
     steps: tuple[ErrorStep, ...]
+    stepping: bool
     elsewhere: Mapping[str, int]
 
 
@@ -87,6 +89,7 @@ def gather_story(
         lanes=tuple(lanes),
         motions=motions,
         steps=error_steps(source.recording_id, tags, wanted),
+        stepping=bool(step_tags),
         elsewhere=errors_elsewhere(source.recording_id, tags, wanted),
     )
 
