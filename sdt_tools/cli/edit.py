@@ -143,6 +143,6 @@ def _print(edited: "tuple[EditedRecording, ...]", journals: "tuple[FollowedJourn
             console.print(f"{original.path}: is cut off; it was read up to where it stops", soft_wrap=True)
     damaged = dict.fromkeys((o.path, met) for new in edited for o in new.originals for met in o.damage)
     for path, met in damaged:
-        console.print(f"{path}: lost from {met.start_ns} to {met.end_ns} ns: {met.reason}", soft_wrap=True)
+        console.print(f"{path}: {met.text}", soft_wrap=True)
     for journal in journals:
         console.print(f"{journal.path}: {journal.acts:,} of {journal.given:,} acts", soft_wrap=True)

@@ -6,7 +6,7 @@ from typing import Annotated
 import typer
 
 from sdt_tools.cli import errors_suspects
-from sdt_tools.cli.console import JsonFlag, console, emit
+from sdt_tools.cli.console import JsonFlag, console, emit, print_incomplete
 from sdt_tools.cli.default_command import WithDefault
 
 app = typer.Typer(
@@ -72,4 +72,5 @@ def analyse(
         console.print(report.note or "no condition was confirmed")
     for warning in report.warnings:
         console.print(warning, style="yellow")
+    print_incomplete(report.incomplete)
     console.print(f"written to {out}; read {out / 'report.html'}", soft_wrap=True)

@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from sdt_tools.cli.console import JsonFlag, console, emit
+from sdt_tools.cli.console import JsonFlag, console, emit, print_incomplete
 
 if TYPE_CHECKING:
     from sdt_tools.recording.inspect import InspectReport
@@ -47,10 +47,7 @@ def _print(report: "InspectReport", plot: Path | None) -> None:
     _print_metadata(report)
     if report.foreign_topics:
         console.print(f"passed over: {', '.join(report.foreign_topics)}")
-    if report.truncated:
-        console.print("cut off: the file has no end; what is listed is what can be read")
-    for damage in report.damage:
-        console.print(f"damaged: from {damage.start_ns} to {damage.end_ns} ns: {damage.reason}", soft_wrap=True)
+    print_incomplete([report.incomplete])
     for line in report.disagreements:
         console.print(f"disagreement: {line}", soft_wrap=True)
     _print_health(report)

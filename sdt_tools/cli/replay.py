@@ -6,7 +6,7 @@ from typing import Annotated
 
 import typer
 
-from sdt_tools.cli.console import JsonFlag, console, emit
+from sdt_tools.cli.console import JsonFlag, console, emit, print_incomplete
 
 
 class Every(StrEnum):
@@ -37,7 +37,13 @@ def command(
     with progress_bar("replaying") as progress:
         summary = replay(loaded, recordings, labels, out, config, model, progress)
     if json_output:
-        emit({**vars(summary), "frames_per_s": round(summary.frames_per_s), "accuracy": summary.accuracy})
+        told = {
+            "truncated": summary.truncated,
+            "incomplete": [recording.document() for recording in summary.incomplete],
+            "frames_per_s": round(summary.frames_per_s),
+            "accuracy": summary.accuracy,
+        }
+        emit(vars(summary) | told)
         return
     console.print(
         f"{summary.frames:,} frames of {summary.recordings} recordings answered by {summary.model} "
@@ -48,12 +54,8 @@ def command(
         console.print("no labels, so no losses" if labels is None else "none of these frames has a label")
     else:
         console.print(f"{summary.labelled:,} labelled, {summary.wrong:,} wrong: accuracy {summary.accuracy:.1%}")
-    for what, names in (
-        ("without a label journal", summary.without_journal),
-        ("cut off, read as far as they go", summary.truncated),
-        ("with damaged chunks", summary.damaged),
-    ):
-        if names:
-            console.print(f"{what}: {', '.join(names)}", style="yellow", soft_wrap=True)
+    if summary.without_journal:
+        console.print(f"without a label journal: {', '.join(summary.without_journal)}", style="yellow")
+    print_incomplete(summary.incomplete)
     if summary.labels_without_scan:
         console.print(f"{summary.labels_without_scan} labels lie at stamps without a scan", style="yellow")

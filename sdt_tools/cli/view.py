@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from sdt_tools.cli.console import JsonFlag, console, emit
+from sdt_tools.cli.console import JsonFlag, console, emit, print_incomplete
 
 if TYPE_CHECKING:
     from sdt_tools.view.log import ViewSummary
@@ -73,7 +73,13 @@ def command(
     if open_:
         _open(target, summary, at)
     if json_output:
-        emit({**vars(summary), "errors": [vars(step) for step in summary.errors], "size_bytes": target.stat().st_size})
+        told = {
+            "errors": [vars(step) for step in summary.errors],
+            "truncated": summary.truncated,
+            "incomplete": None if summary.incomplete is None else summary.incomplete.document(),
+            "size_bytes": target.stat().st_size,
+        }
+        emit(vars(summary) | told)
         return
     models = f", models: {', '.join(summary.models)}" if summary.models else ""
     console.print(
@@ -81,8 +87,8 @@ def command(
         f"({target.stat().st_size / 1e6:.1f} MB in {summary.seconds:.1f} s)",
         soft_wrap=True,
     )
-    if summary.truncated:
-        console.print("the recording was cut off; it is shown as far as it goes", style="yellow")
+    if summary.incomplete is not None:
+        print_incomplete([summary.incomplete])
     if errors:
         _list_errors(summary, " or ".join(tag or []))
     if not open_:

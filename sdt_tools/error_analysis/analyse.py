@@ -48,9 +48,9 @@ def analyse_errors(
         raise OutputExistsError(out)
     frames = load_labelled(predictions, options, model)
     paths = find_recordings(frames, recordings)
-    scans = read_situations(frames, paths, options, progress)
+    scans, incomplete = read_situations(frames, paths, options, progress)
     explanation = explain(frames, scans, options)
-    report = summarise(frames, explanation, options)
+    report = summarise(frames, explanation, options, incomplete)
     examples = draw_examples(frames, explanation, scans, paths, options)
     inputs = {"predictions": content_hash(predictions), "recordings": {path.stem: content_hash(path) for path in paths}}
     document = {**report.document(), "code_version": code_version(), "inputs": inputs}

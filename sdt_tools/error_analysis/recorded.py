@@ -11,6 +11,7 @@ from sdt_tools.error_analysis.distance import situations
 from sdt_tools.error_analysis.labelled import LabelledFrames
 from sdt_tools.errors import RecordingError
 from sdt_tools.frames import RAYS
+from sdt_tools.recording.incomplete import Incomplete, incomplete
 from sdt_tools.recording.reader import Recording
 from sdt_tools.runs.local import Progress
 
@@ -39,12 +40,15 @@ def find_recordings(frames: LabelledFrames, places: Sequence[Path]) -> tuple[Pat
 
 def read_situations(
     frames: LabelledFrames, paths: Sequence[Path], options: ErrorOptions, progress: Progress | None = None
-) -> Float32[np.ndarray, "frames rays"]:
-    """The situation of each frame; ``paths`` are the recordings in the order of ``frames``.
+) -> tuple[Float32[np.ndarray, "frames rays"], tuple[Incomplete, ...]]:
+    """The situation of each frame, and the recordings that are cut off or damaged.
+
+    ``paths`` are the recordings in the order of ``frames``.
 
     Raises RecordingError where a recording cannot be read or lacks the scan of a frame.
     """
     scans = np.empty((len(frames.loss), RAYS), np.float32)
+    missing = []
     starts = np.searchsorted(frames.recording, np.arange(len(paths) + 1))
     for number, path in enumerate(paths):
         if progress:
@@ -58,6 +62,7 @@ def read_situations(
                 found = wanted_ns[np.minimum(rows, len(wanted_ns) - 1)] == batch.stamps_ns
                 scans[first + rows[found]] = situations(batch.ranges_m[found], options)
                 filled[rows[found]] = True
+            missing.append(incomplete(recording))
         if not filled.all():
             raise RecordingError(
                 f"{path}: lacks the scans of {int((~filled).sum())} of {len(filled)} frames of the predictions; "
@@ -65,7 +70,7 @@ def read_situations(
             )
     if progress:
         progress(len(paths), len(paths))
-    return scans
+    return scans, tuple(one for one in missing if one is not None)
 
 
 def _identities(frames: LabelledFrames) -> list[tuple[str, str]]:

@@ -1,5 +1,6 @@
 """Recordings, read: streaming, a chunk at a time, whole or cut off or damaged."""
 
+from collections import Counter
 from collections.abc import Collection, Iterator, Mapping
 from functools import cached_property
 from pathlib import Path
@@ -13,10 +14,11 @@ from sdt_tools.frames import Message, Received
 from sdt_tools.recording.container.extents import Extent
 from sdt_tools.recording.container.reader import Damage, McapReader, RawEntry
 from sdt_tools.recording.messages.codec import decode
-from sdt_tools.recording.messages.topics import LIDAR_SCAN, TOPICS, is_ours
+from sdt_tools.recording.messages.topics import LIDAR_SCAN, TOPIC_BY_NAME, TOPICS, Topic, is_ours
 from sdt_tools.recording.series import ScanSeries, joined
 from sdt_tools.recording.session import CONFIG_NAME, SESSION, STATS, derived_id
 from sdt_tools.recording.summary import TopicSummary
+from sdt_tools.recording.timing.pauses import Pauses, pauses_in
 from sdt_tools.recording.timing.stamps import StampLog, read_stamps
 
 ROS2: Final = "ros2"
@@ -43,8 +45,10 @@ class Recording:
             if is_ours(channel.topic, self._file.schema_name(channel), channel.message_encoding)
         }
         if not self._ours and not self.session:
-            is_bag = self._file.profile == ROS2
+            is_bag = self._file.header.profile == ROS2
             self.close()
+            if self.truncated and not channels:
+                raise RecordingError(f"{path}: was cut off before its first topic; nothing can be read of it")
             advice = "`sdt import ros2` makes a recording of the bag" if is_bag else "check that it is a recording"
             found = ", ".join(sorted({channel.topic for channel in channels.values()})) or "no topics at all"
             raise RecordingError(
@@ -100,6 +104,11 @@ class Recording:
         return self._metadata(STATS)
 
     @property
+    def pauses(self) -> Pauses:
+        """When nothing was recorded because somebody wanted it so; half-open, in host time."""
+        return pauses_in(self._file)
+
+    @property
     def recording_id(self) -> str:
         """The recording's UUID; for files without one, derived from how they begin."""
         return self._recording_id
@@ -145,6 +154,15 @@ class Recording:
         return read_stamps(self._file, {number: channel.topic for number, channel in self._ours.items()})
 
     @property
+    def foreign_counts(self) -> Mapping[str, int]:
+        """Messages of topics that are passed over, by topic."""
+        counts: Counter[str] = Counter()
+        for number, channel in self._file.channels.items():
+            if number not in self._ours:
+                counts[channel.topic] += self._file.extents[number].count
+        return dict(sorted(counts.items()))
+
+    @property
     def foreign_topics(self) -> tuple[str, ...]:
         """Topics in the file that are passed over."""
         return tuple(sorted({c.topic for number, c in self._file.channels.items() if number not in self._ours}))
@@ -160,6 +178,17 @@ class Recording:
             message = decoded(self._file, entry)
             if message is not None:
                 yield Received(entry.log_ns, message)
+
+    def entries(
+        self, topics: Collection[str] | None = None, start_ns: int | None = None, end_ns: int | None = None
+    ) -> Iterator[tuple[Topic, RawEntry]]:
+        """The same, not decoded: whoever finds one that does not parse calls ``lose``."""
+        for entry in self._file.entries(self._numbers(topics), start_ns, end_ns):
+            yield TOPIC_BY_NAME[self._ours[entry.channel_id].topic], entry
+
+    def lose(self, topic: Topic, entry: RawEntry) -> None:
+        """Name in ``damage`` a message of ``topic`` that does not parse."""
+        self._file.lose(entry.offset, entry.start, entry.log_ns, not_valid(topic.name, topic.schema))
 
     def scans(self) -> ScanSeries:
         """All scans as one series, 4.3 kB a scan, in order of receipt; no scans make an empty series.

@@ -13,6 +13,7 @@ import rerun as rr
 from sdt_tools.config import MotionConfig
 from sdt_tools.errors import OutputExistsError, UsageError
 from sdt_tools.frames import RAYS, CameraImage
+from sdt_tools.recording.incomplete import Incomplete, incomplete
 from sdt_tools.recording.messages.topics import CAMERA_IMAGE
 from sdt_tools.recording.reader import Recording
 from sdt_tools.view.blueprint import Content, blueprint
@@ -34,7 +35,7 @@ SCANS_ON_MAP: Final = 150
 
 @dataclass(frozen=True)
 class ViewSummary:
-    """What went into an .rrd. ``lanes`` are entities; a recording that is ``truncated`` is shown as far as it goes.
+    """What went into an .rrd. ``lanes`` are entities; an ``incomplete`` recording is shown as far as it goes.
 
     ``errors`` are those to step through, in the order of their numbers; ``errors_elsewhere`` counts the like in other
     recordings.
@@ -49,8 +50,13 @@ class ViewSummary:
     lanes: tuple[str, ...]
     errors: tuple[ErrorStep, ...]
     errors_elsewhere: Mapping[str, int]
-    truncated: bool
+    incomplete: Incomplete | None
     seconds: float
+
+    @property
+    def truncated(self) -> bool:
+        """Whether the recording was cut off."""
+        return self.incomplete is not None and self.incomplete.truncated
 
 
 def write_rrd(
@@ -100,7 +106,7 @@ def write_rrd(
             lanes=tuple(lane.entity for lane in story.lanes),
             errors=story.steps,
             errors_elsewhere=story.elsewhere,
-            truncated=source.truncated,
+            incomplete=incomplete(source),
             seconds=time.perf_counter() - began,
         )
 

@@ -26,7 +26,7 @@ class SuspectOptions(Config):
     """
 
     folds: int = Field(default=5, ge=2, le=20)
-    method: Literal["prune_by_noise_rate", "prune_by_class", "both", "confident_learning"] = "prune_by_noise_rate"
+    method: Literal["prune_by_noise_rate", "prune_by_class", "both", "confident_learning"] = "both"
     spacing_s: float = Field(default=0.1, ge=0.0)
     seed: int = Field(default=0, ge=0)
     training: FollowTrainingConfig = Field(default_factory=_brief)

@@ -171,11 +171,14 @@ class McapFile:
         record = _record(Metadata(name, dict(entries)))
         self._metadata.append(MetadataIndex(self._write(record), len(record), name))
 
-    def add_attachment(self, name: str, media_type: str, data: bytes, stamp_ns: int) -> None:
-        """Write a file into the file."""
-        record = _record(Attachment(stamp_ns, stamp_ns, name, media_type, data))
+    def add_attachment(
+        self, name: str, media_type: str, data: bytes, log_ns: int, created_ns: int | None = None
+    ) -> None:
+        """Write a file into the file, made when it is logged unless another time is given."""
+        made_ns = log_ns if created_ns is None else created_ns
+        record = _record(Attachment(create_time=made_ns, log_time=log_ns, name=name, media_type=media_type, data=data))
         offset = self._write(record)
-        self._attachments.append(AttachmentIndex(offset, len(record), stamp_ns, stamp_ns, len(data), name, media_type))
+        self._attachments.append(AttachmentIndex(offset, len(record), made_ns, log_ns, len(data), name, media_type))
 
     def finish_chunks(self) -> None:
         """Hand what is pending to the operating system: from here on it survives the end of this process."""

@@ -8,17 +8,15 @@ that is damaged, where whoever knows what it means says so (``lose``).
 import contextlib
 import logging
 import mmap
-import struct
 from collections.abc import Iterator, Mapping, Set
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise
 from pathlib import Path
 from types import TracebackType
-from typing import Final, NamedTuple
+from typing import NamedTuple
 
-from mcap.opcode import Opcode
-from mcap.records import Attachment, Channel, Metadata, Schema
+from mcap.records import Attachment, Channel, Header, Metadata, Schema
 
 from sdt_tools.errors import RecordingError
 from sdt_tools.recording.container.attachments import read_attachment
@@ -37,9 +35,6 @@ from sdt_tools.recording.container.index import read_index
 from sdt_tools.recording.container.records import HEAD, FileIndex
 
 _log = logging.getLogger(__name__)
-_HEADER: Final = struct.Struct("<BQI")  # opcode, length of the record, length of the profile
-_HEADER_END: Final = len(MAGIC) + _HEADER.size
-_LONGEST_PROFILE: Final = 256
 
 
 @dataclass(frozen=True)
@@ -49,6 +44,13 @@ class Damage:
     start_ns: int
     end_ns: int
     reason: str
+
+    @property
+    def text(self) -> str:
+        """The same for people; what costs no message has no interval."""
+        if not self.end_ns:
+            return self.reason
+        return f"lost from {self.start_ns} to {self.end_ns} ns: {self.reason}"
 
 
 class RawEntry(NamedTuple):
@@ -107,11 +109,9 @@ class McapReader:
         return self._view[: 1 << 20]
 
     @property
-    def profile(self) -> str:
-        """Whose conventions the file says it keeps, as ``ros2``; empty where it says none, or its header is damaged."""
-        opcode, _, length = _HEADER.unpack_from(self._view, len(MAGIC)) if len(self._view) >= _HEADER_END else (0, 0, 0)
-        known = opcode == Opcode.HEADER and length <= _LONGEST_PROFILE
-        return bytes(self._view[_HEADER_END : _HEADER_END + length]).decode(errors="replace") if known else ""
+    def header(self) -> Header:
+        """The profile that the file keeps to and the library that wrote it; empty where it does not say."""
+        return self._index.header
 
     @property
     def truncated(self) -> bool:

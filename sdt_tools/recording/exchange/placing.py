@@ -1,12 +1,11 @@
 """Outputs that stand under their name only when they are whole."""
 
-import shutil
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
 from sdt_tools.errors import DiskRefusedError, OutputExistsError
-from sdt_tools.recording.scratch import scratch_folder
+from sdt_tools.recording.scratch import give_name, scratch_folder
 
 
 @contextmanager
@@ -18,14 +17,11 @@ def placed(out: Path, inner: str) -> Iterator[Path]:
     """
     if out.exists():
         raise OutputExistsError(out)
-    scratch = scratch_folder(out, "part")
-    try:
+    with scratch_folder(out) as scratch:
         made = scratch / inner
-        yield made
-        if out.exists():
-            raise OutputExistsError(out)
-        made.rename(out)
-    except OSError as error:
-        raise DiskRefusedError(f"{out}: cannot be written: {error.strerror or error}; make room on that disk") from None
-    finally:
-        shutil.rmtree(scratch, ignore_errors=True)
+        try:
+            yield made
+        except OSError as error:
+            reason = error.strerror or error
+            raise DiskRefusedError(f"{out}: cannot be written: {reason}; make room on that disk") from None
+        give_name(made, out)

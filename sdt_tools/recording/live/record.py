@@ -18,7 +18,7 @@ from sdt_tools.recording.live.outcome import Ending, RecordingProgress, Recordin
 from sdt_tools.recording.live.pace import paced
 from sdt_tools.recording.live.pressure import QueueLimits
 from sdt_tools.recording.live.sink import DirectSink, QueuedSink
-from sdt_tools.recording.live.take import Take, Tally, stats_of
+from sdt_tools.recording.live.take import Take, Tally
 from sdt_tools.recording.writer import RecordingWriter
 
 
@@ -106,7 +106,7 @@ class _OneTake:
     def tick(self, now_ns: int) -> Iterator[LogEntry]:
         """Watch the writer and the disk."""
         yield from self._take.watch(now_ns)
-        if self._take.space is not None and self._take.space.full:
+        if self._take.disk_is_full:
             self.ending = Ending.DISK
 
     def time_up(self, now_ns: int) -> list[LogEntry]:
@@ -117,15 +117,13 @@ class _OneTake:
 
     def last_words(self, now_ns: int) -> list[LogEntry]:
         """Drops that are not told yet."""
-        return self._take.sink.bursts(now_ns, at_end=True)
+        return self._take.last_words(now_ns)
 
     def end(self, ending: Ending, now_ns: int) -> None:
         """Note what came of it. Raises what the writer met while the last messages were written."""
         self._take.stop(now_ns)
-        self.summary = self._take.finish(ending)
-        self._writer.note(stats_of(self.summary))
-        if self._take.sink.failure is not None and ending is not Ending.FAILED:
-            raise self._take.sink.failure
+        self.summary = self._take.finish(ending, self._writer)
+        self._take.check(ending)
 
     def progress(self, now_ns: int) -> RecordingProgress:
         """Where the take stands."""

@@ -18,7 +18,8 @@ from sdt_tools.recording.live.latched import Latched
 from sdt_tools.recording.live.outcome import Ending, RecordingProgress
 from sdt_tools.recording.live.session_folder import SessionFolder
 from sdt_tools.recording.live.sink import DirectSink, QueuedSink
-from sdt_tools.recording.live.take import Take, Tally, stats_of
+from sdt_tools.recording.live.take import Take, Tally
+from sdt_tools.recording.timing.pauses import paused_entry, resumed_entry
 from sdt_tools.recording.writer import RecordingWriter
 
 _LISTEN_S: Final = 0.05
@@ -140,8 +141,7 @@ class TakeRecorder:
         self._clerk.check()
         if self._running is not None:
             yield from self._running.take.watch(now_ns)
-            space = self._running.take.space
-            if space is not None and space.full:
+            if self._running.take.disk_is_full:
                 self.ending = Ending.DISK
         for act in self._control.heard() if self._control is not None else ():
             yield from self._do(act, now_ns)
@@ -159,7 +159,7 @@ class TakeRecorder:
     def last_words(self, now_ns: int) -> Iterator[LogEntry]:
         """Drops that are not told yet."""
         if self._running is not None:
-            yield from self._running.take.sink.bursts(now_ns, at_end=True)
+            yield from self._running.take.last_words(now_ns)
 
     def end(self, ending: Ending, now_ns: int) -> None:
         """The source is through: the running take ends, and the ring is saved where it is due."""
@@ -205,11 +205,10 @@ class TakeRecorder:
         elif wish is Wish.SAVE and self._keep_last is not None:
             self._keep_last.trigger(act.text or "a key", now_ns)
         elif wish is Wish.PAUSE and running is not None and not running.take.paused:
-            yield LogEntry(now_ns, LogLevel.INFO, "paused: nothing is recorded until it is resumed", "pause")
+            yield paused_entry(now_ns)
             running.take.pause(now_ns)
         elif wish is Wish.RESUME and running is not None and running.take.paused:
-            lasted_s = running.take.resume(now_ns)
-            yield LogEntry(now_ns, LogLevel.INFO, f"resumed after a pause of {lasted_s:.3f} s", "pause")
+            yield resumed_entry(now_ns, running.take.resume(now_ns))
         if wish in (Wish.START, Wish.NEXT) and self._running is None:
             self._start(now_ns)
 
@@ -231,15 +230,13 @@ class TakeRecorder:
             self._clerk.do(partial(self._finish, running, ending))
 
     def _finish(self, running: _Running, ending: Ending) -> None:
-        summary = running.take.finish(ending)
-        running.writer.note(stats_of(summary))
+        summary = running.take.finish(ending, running.writer)
         try:
             running.writer.close()
         finally:
             self._folder.ended(running.path, summary)
             self._done = f"{running.path.stem} kept"
-        if running.take.sink.failure is not None and ending is not Ending.FAILED:
-            raise running.take.sink.failure
+        running.take.check(ending)
 
     def _discard_last(self, now_ns: int) -> None:
         def discard() -> None:

@@ -52,7 +52,7 @@ def altered(material: Material, tmp_path: Path, **changes: pl.Expr) -> Path:
 def report_of(predictions: Path, material: Material, options: ErrorOptions = OPTIONS) -> ErrorReport:
     """The analysis without its files."""
     frames = load_labelled(predictions, options)
-    scans = read_situations(frames, find_recordings(frames, [material.recordings]), options)
+    scans, _ = read_situations(frames, find_recordings(frames, [material.recordings]), options)
     return summarise(frames, explain(frames, scans, options), options)
 
 

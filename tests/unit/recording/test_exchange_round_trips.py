@@ -45,14 +45,21 @@ def test_parquet_and_back_every_byte_is_equal(tmp_path: Path) -> None:
     assert as_it_lies(tmp_path / "back.mcap") == as_it_lies(there)
 
 
+def untimed(path: Path) -> tuple[list[tuple[str, int, int, bytes]], dict[str, dict[str, str]]]:
+    """What lies in ``path``, without timing: the samples are older than that."""
+    messages, metadata = as_it_lies(path)
+    stats = {name: text for name, text in metadata["sdt.stats"].items() if not name.startswith("timing.")}
+    return messages, metadata | {"sdt.stats": stats}
+
+
 @pytest.mark.parametrize("sample", SAMPLES, ids=lambda path: path.stem)
 def test_the_samples_come_back_as_they_went(tmp_path: Path, sample: Path) -> None:
     export_ros2(sample, tmp_path / "bag")
     import_ros2(tmp_path / "bag", tmp_path / "ros2.mcap", *DEFAULT)
     export_parquet(sample, tmp_path / "folder")
     import_parquet(tmp_path / "folder", tmp_path / "parquet.mcap")
-    assert as_it_lies(tmp_path / "ros2.mcap") == as_it_lies(sample)
-    assert as_it_lies(tmp_path / "parquet.mcap") == as_it_lies(sample)
+    assert untimed(tmp_path / "ros2.mcap") == untimed(sample)
+    assert untimed(tmp_path / "parquet.mcap") == untimed(sample)
     with Recording.open(sample) as there, Recording.open(tmp_path / "ros2.mcap") as back:
         assert back.recording_id == there.recording_id
         assert back.config_toml == there.config_toml
