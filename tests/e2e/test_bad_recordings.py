@@ -242,7 +242,7 @@ def test_the_list_shows_the_whole_name_that_restore_takes(sdt: Sdt, place: Path)
         ("scanless", [], ["scanless: holds no scans", "/cmd_vel", "--scan-topic none"]),
         ("two", [], ["two: several topics hold scans: /a", "/b", "--scan-topic"]),
         ("two", ["--scan-topic", "/c"], ["two: --scan-topic /c: no such topic", "/a"]),
-        ("cut", [], ["cut: a ROS 2 bag that is damaged or unfinished", "sdt repair"]),
+        ("cut", [], ["cut/cut.mcap: the bag was cut off", "sdt repair cut/cut.mcap"]),
         ("two", ["--lossless", "--jpeg-quality", "50"], ["--lossless and --jpeg-quality"]),
     ],
 )

@@ -12,7 +12,7 @@ from recording_samples import T0, read_by_mcap, scan
 from sdt_tools.errors import RecordingError
 from sdt_tools.frames import LidarScan, Odometry, Pose2D
 from sdt_tools.recording.container.reader import Damage
-from sdt_tools.recording.exchange.carried import Outgoing
+from sdt_tools.recording.exchange.carried import outgoing
 from sdt_tools.recording.messages.codec import encode
 from sdt_tools.recording.messages.schemas import schema_data
 from sdt_tools.recording.reader import Recording
@@ -122,9 +122,9 @@ def test_each_topic_has_its_own_account(tmp_path: Path) -> None:
 
 
 def test_what_is_carried_elsewhere_leaves_it_behind(tmp_path: Path) -> None:
-    with Outgoing(put(tmp_path, drive({3: CUT}))) as outgoing:
-        assert sum(1 for _ in outgoing.messages()) == 11
-        assert [damage.reason for damage in outgoing.damage] == [f"1 {NOT_A_SCAN}"]
+    with Recording.open(put(tmp_path, drive({3: CUT}))) as recording:
+        assert sum(1 for _ in outgoing(recording)) == 11
+        assert [damage.reason for damage in recording.damage] == [f"1 {NOT_A_SCAN}"]
 
 
 def test_repair_leaves_it_out_and_counts_it(tmp_path: Path) -> None:
