@@ -41,15 +41,16 @@ def analyse_errors(
 
     ``recordings`` are MCAP files or folders of them, from which the scans are read again; ``model`` is needed where the
     predictions are of several. ``found_at`` is where the folder will lie for good, for the commands in the page;
-    without, ``out``. Raises UsageError for predictions that cannot be analysed, RecordingError for recordings that are
-    missing or others, OutputExistsError.
+    without, ``out``. ``progress`` hears of recordings read, then of error frames compared. While it works it needs
+    2.2 kB of disk a frame beside ``out``. Raises UsageError for predictions that cannot be analysed, RecordingError for
+    recordings that are missing or others, OutputExistsError, SdtError without that room.
     """
     if out.exists():
         raise OutputExistsError(out)
     frames = load_labelled(predictions, options, model)
     paths = find_recordings(frames, recordings)
-    scans, incomplete = read_situations(frames, paths, options, progress)
-    explanation = explain(frames, scans, options)
+    scans, incomplete = read_situations(frames, paths, options, progress, scratch=out.parent)
+    explanation = explain(frames, scans, options, progress)
     report = summarise(frames, explanation, options, incomplete)
     examples = draw_examples(frames, explanation, scans, paths, options)
     inputs = {"predictions": content_hash(predictions), "recordings": {path.stem: content_hash(path) for path in paths}}
