@@ -36,6 +36,8 @@ class Tag(StrEnum):
     CORRECT = "correct"
 
 
+ERROR_TAGS: Final = tuple(tag for tag in Tag if tag is not Tag.CORRECT)
+
 DEFAULT_FEATURES: Final = (
     "front_range_m",
     "operator_range_m",

@@ -24,10 +24,10 @@ from sdt_tools.frames import (
     Pose2D,
     Received,
 )
+from sdt_tools.top_view import codes, front_range_m, lidar_poses, seen_from
 from sdt_tools.view import entities, palette
 from sdt_tools.view.blueprint import Content, blueprint
 from sdt_tools.view.camera_view import send_images, send_signals, style_signals
-from sdt_tools.view.geometry import codes, front_range_m, lidar_poses, seen_from
 from sdt_tools.view.lanes import style_lane
 from sdt_tools.view.notes import USUAL_MOUNT, USUAL_WIDTH_PX, is_lidar_mount, mount_of
 from sdt_tools.view.people import send_operator, style_operator

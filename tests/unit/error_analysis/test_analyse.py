@@ -77,7 +77,8 @@ def test_a_model_that_never_stops_fails_where_something_is_near(analysed: tuple[
 
 def test_the_folder_holds_tags_report_and_figures(analysed: tuple[ErrorReport, Path], material: Material) -> None:
     _, out = analysed
-    assert sorted(path.name for path in out.iterdir()) == ["epsilon.png", "errors.json", "tags.parquet", "tags.png"]
+    files = ["epsilon.png", "errors.json", "report.html", "tags.parquet", "tags.png"]
+    assert sorted(path.name for path in out.iterdir()) == files
     document = json.loads((out / "errors.json").read_text())
     assert document["options"] == OPTIONS.model_dump(mode="json")
     assert len(document["inputs"]["recordings"]) == 10
