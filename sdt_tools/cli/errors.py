@@ -7,6 +7,7 @@ import typer
 
 from sdt_tools.cli.console import JsonFlag, console, emit
 from sdt_tools.cli.default_command import WithDefault
+from sdt_tools.cli.errors_selftest import selftest
 
 app = typer.Typer(
     cls=WithDefault,
@@ -69,3 +70,6 @@ def analyse(
     for warning in report.warnings:
         console.print(f"[yellow]{warning}")
     console.print(f"written to {out}", soft_wrap=True)
+
+
+app.command("selftest")(selftest)
