@@ -77,7 +77,9 @@ def _show(result: "SelfTest") -> None:
     console.print(tags)
     conditions = Table("ends", "planted", "features right", "bounds right", title="conditions")
     for name, of in (("sharp", result.sharp), ("blurred", result.blurred)):
-        conditions.add_row(name, str(of.planted), *(_of(right, of.planted) for right in (of.features_right, of.bounds_right)))
+        conditions.add_row(
+            name, str(of.planted), *(_of(right, of.planted) for right in (of.features_right, of.bounds_right))
+        )
     console.print(conditions)
     console.print(f"{result.false} false conditions, {result.other} in other words than those planted")
     if result.null:

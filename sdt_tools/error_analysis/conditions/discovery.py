@@ -15,7 +15,7 @@ from jaxtyping import Bool, Float64, Int64
 from sdt_tools.error_analysis.conditions.merging import merge, refit
 from sdt_tools.error_analysis.conditions.predicates import Condition, Predicate
 from sdt_tools.error_analysis.conditions.scoring import Scope
-from sdt_tools.error_analysis.conditions.shaping import extend, refine, simplify
+from sdt_tools.error_analysis.conditions.shaping import Candidates, extend, refine, simplify
 
 BLOCK_FRAMES = 65_536
 """Frames whose predicates are held as numbers at a time; counts up to here are exact in float32."""
@@ -30,11 +30,12 @@ NEARLY = 0.01
 def discover(scope: Scope, recording: Int64[np.ndarray, "frames"]) -> list[Condition]:
     """Candidate conditions, strongest first, each with frames in enough recordings."""
     found: list[Condition] = []
-    predicates = list(candidate_predicates(scope))
-    masks = [predicate.mask(scope.features) for predicate in predicates]
+    predicates = tuple(candidate_predicates(scope))
+    masks = np.array([predicate.mask(scope.features) for predicate in predicates])
+    candidates = Candidates(predicates, masks.reshape(len(predicates), len(scope.loss)))
     left, sums = scope, _pair_sums(scope, masks, scope.active)
     while predicates and len(found) < scope.options.max_conditions:
-        condition = _best(left, predicates, sums)
+        condition = _best(left, candidates, sums)
         if condition is None:
             break
         inside = condition.mask(scope.features) & left.active
@@ -67,7 +68,7 @@ def candidate_predicates(scope: Scope) -> Iterator[Predicate]:
 
 
 def _best(
-    scope: Scope, predicates: list[Predicate], sums: Float64[np.ndarray, "3 predicates predicates"]
+    scope: Scope, candidates: Candidates, sums: Float64[np.ndarray, "3 predicates predicates"]
 ) -> Condition | None:
     """The condition that is worth most, grown from single predicates and pairs; None where none scores enough.
 
@@ -75,23 +76,21 @@ def _best(
     features are shaped before one is chosen.
     """
     seeds = [
-        *_seeds(scope.scores(sums), predicates, scope.options.min_score)[:SHAPED_PAIRS],
-        *_seeds(scope.gains(sums), predicates, scope.options.min_score)[:SHAPED_PAIRS_AT_ALL],
+        *_seeds(scope.scores(sums), candidates.predicates, scope.options.min_score)[:SHAPED_PAIRS],
+        *_seeds(scope.gains(sums), candidates.predicates, scope.options.min_score)[:SHAPED_PAIRS_AT_ALL],
     ]
     refined = dict.fromkeys(refine(scope, condition) for condition in dict.fromkeys(seeds))
-    extended = dict.fromkeys(extend(scope, condition, predicates) for condition in refined)
+    extended = dict.fromkeys(extend(scope, condition, candidates) for condition in refined)
     shaped = dict.fromkeys(simplify(scope, condition) for condition in extended)
     worth = {
-        condition: scope.worth(condition)
-        for condition in shaped
-        if scope.score(condition) >= scope.options.min_score
+        condition: scope.worth(condition) for condition in shaped if scope.score(condition) >= scope.options.min_score
     }
     nearly = [condition for condition in worth if worth[condition] >= (1.0 - NEARLY) * max(worth.values())]
     return min(nearly, key=lambda condition: (scope.cost(condition), -worth[condition]), default=None)
 
 
 def _seeds(
-    scores: Float64[np.ndarray, "predicates predicates"], predicates: list[Predicate], least: float
+    scores: Float64[np.ndarray, "predicates predicates"], predicates: tuple[Predicate, ...], least: float
 ) -> list[Condition]:
     """The best predicate or pair of each two features, from the best of all, as far as they score ``least``."""
     features = np.array([predicate.feature for predicate in predicates])
@@ -107,14 +106,14 @@ def _seeds(
 
 
 def _pair_sums(
-    scope: Scope, masks: list[Bool[np.ndarray, "frames"]], among: Bool[np.ndarray, "frames"]
+    scope: Scope, masks: Bool[np.ndarray, "predicates frames"], among: Bool[np.ndarray, "frames"]
 ) -> Float64[np.ndarray, "3 predicates predicates"]:
     """Frames, errors and loss in the intersection of each two predicates; on the diagonal, in each one."""
     rows = np.flatnonzero(among)
     sums = np.zeros((3, len(masks), len(masks)))
     for start in range(0, len(rows), BLOCK_FRAMES):
         block = rows[start : start + BLOCK_FRAMES]
-        inside = np.array([mask[block] for mask in masks], dtype=np.float32)
+        inside = masks[:, block].astype(np.float32)
         sums[0] += inside @ inside.T
         wrong = np.ascontiguousarray(inside[:, scope.wrong[block]])
         sums[1] += wrong @ wrong.T

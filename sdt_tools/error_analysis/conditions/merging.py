@@ -1,10 +1,10 @@
 """Conditions that overlap, merged into the simplest that explains as much."""
 
-from itertools import combinations
+from itertools import combinations, product
 
 import numpy as np
 
-from sdt_tools.error_analysis.conditions.predicates import Condition, Predicate
+from sdt_tools.error_analysis.conditions.predicates import Condition
 from sdt_tools.error_analysis.conditions.scoring import Scope
 from sdt_tools.error_analysis.conditions.shaping import refine, simplify
 
@@ -71,9 +71,9 @@ def _score_together(scope: Scope, conditions: list[Condition]) -> float:
 
 def _wider(first: Condition, second: Condition) -> Condition | None:
     """What both say: the looser of two bounds on one side, the names of either; None where they share nothing."""
-    shared: list[Predicate] = []
-    for one in first.predicates:
-        for other in second.predicates:
-            if one.feature == other.feature and one.side == other.side:
-                shared.append(one.widened(other))
-    return Condition(tuple(shared)) if shared else None
+    shared = tuple(
+        one.widened(other)
+        for one, other in product(first.predicates, second.predicates)
+        if one.feature == other.feature and one.side == other.side
+    )
+    return Condition(shared) if shared else None

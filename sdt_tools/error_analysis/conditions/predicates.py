@@ -29,12 +29,8 @@ class Features:
 
     def take(self, rows: Bool[np.ndarray, "frames"]) -> "Features":
         """The features of some frames."""
-        return self.take_rows(np.flatnonzero(rows))
-
-    def take_rows(self, rows: Int64[np.ndarray, "rows"]) -> "Features":
-        """The features of the frames with these numbers."""
         return Features(
-            len(rows),
+            int(rows.sum()),
             {name: values[rows] for name, values in self.numeric.items()},
             {name: values[rows] for name, values in self.codes.items()},
             self.categories,
@@ -157,7 +153,6 @@ class Condition:
             key = (predicate.feature, predicate.side)
             tightest[key] = tightest[key].narrowed(predicate) if key in tightest else predicate
         return Condition(tuple(tightest.values()))
-
 
     def plain(self) -> "Condition":
         """The same frames, with the magnitude of a number left out where bounds on the number itself say it.

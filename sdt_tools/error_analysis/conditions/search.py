@@ -46,9 +46,7 @@ def find_conditions(frames: LabelledFrames, options: ErrorOptions) -> ConditionS
         empty = np.zeros((0, features.frames), bool)
         return ConditionSearch((), empty, names, features.unavailable, note or "no feature tells frames apart")
     half = split_recordings(frames, features, rng)[frames.recording]
-    scope = scope_of(
-        features.take(half), frames.loss[half], frames.wrong[half], options.eta, options.conditions
-    )
+    scope = scope_of(features.take(half), frames.loss[half], frames.wrong[half], options.eta, options.conditions)
     candidates = discover(scope, frames.recording[half])
     masks = [candidate.mask(features) for candidate in candidates]
     others = Recordings(frames.loss[~half], frames.wrong[~half], frames.recording[~half])

@@ -1,5 +1,7 @@
 """A condition made as good, and as short, as it can be: bounds moved, names added, predicates added and dropped."""
 
+from dataclasses import dataclass
+
 import numpy as np
 from jaxtyping import Bool, Float64, Int64
 
@@ -12,6 +14,14 @@ MOST_PREDICATES = 4
 """Two intervals, or three other predicates, and one to spare: longer sentences say little to a reader."""
 EQUAL_SCORE = 0.5
 """Bounds whose scores differ by less (in nats) are as good as each other: of these the simplest number is taken."""
+
+
+@dataclass(frozen=True, eq=False)
+class Candidates:
+    """Predicates that a condition may be extended by, and the frames that fulfil each."""
+
+    predicates: tuple[Predicate, ...]
+    masks: Bool[np.ndarray, "predicates frames"]
 
 
 def refine(scope: Scope, condition: Condition) -> Condition:
@@ -27,14 +37,12 @@ def refine(scope: Scope, condition: Condition) -> Condition:
     return condition
 
 
-def extend(scope: Scope, condition: Condition, predicates: list[Predicate]) -> Condition:
+def extend(scope: Scope, condition: Condition, candidates: Candidates) -> Condition:
     """The condition with further predicates, as long as each adds more to its score than dropping one may cost."""
     while len(condition.predicates) < MOST_PREDICATES:
-        inside = condition.mask(scope.features) & scope.active
-        rows = np.flatnonzero(inside)
-        narrowed = scope.features.take_rows(rows)
-        sums = np.array([_sums(scope, rows[predicate.mask(narrowed)]) for predicate in predicates])
-        longer = refine(scope, condition.joined((predicates[int(scope.gains(sums.T).argmax())],)))
+        rows = np.flatnonzero(condition.mask(scope.features) & scope.active)
+        best = int(scope.gains(_sums(scope, candidates.masks, rows)).argmax())
+        longer = refine(scope, condition.joined((candidates.predicates[best],)))
         if len(longer.predicates) <= len(condition.predicates) or not _worth_saying(scope, longer, condition):
             break
         condition = longer.plain()
@@ -99,5 +107,11 @@ def _best_names(scope: Scope, rest: Bool[np.ndarray, "frames"], predicate: Predi
     return Predicate.among(predicate.feature, tuple(names[code] for code in sorted(chosen)))
 
 
-def _sums(scope: Scope, rows: Int64[np.ndarray, "rows"]) -> Float64[np.ndarray, "3"]:
-    return np.array([len(rows), np.count_nonzero(scope.wrong[rows]), scope.loss[rows].sum()], dtype=np.float64)
+def _sums(
+    scope: Scope, masks: Bool[np.ndarray, "predicates frames"], rows: Int64[np.ndarray, "rows"]
+) -> Float64[np.ndarray, "3 predicates"]:
+    """Frames, errors and loss of those of ``rows`` that each predicate holds in."""
+    wrong = rows[scope.wrong[rows]]
+    lossy = rows[scope.loss[rows] != 0.0]
+    loss = masks[:, lossy] @ scope.loss[lossy]
+    return np.array([np.count_nonzero(masks[:, rows], axis=1), np.count_nonzero(masks[:, wrong], axis=1), loss])

@@ -22,7 +22,9 @@ def sticky_uniforms(
     """Uniform numbers that each hold for ``hold_frames`` frames on average, and never beyond a recording."""
     fresh = rng.random(len(recording)) < 1.0 / hold_frames
     fresh[np.flatnonzero(np.diff(recording, prepend=-1))] = True
-    held: Float64[np.ndarray, "frames"] = rng.random(len(recording))[np.maximum.accumulate(np.where(fresh, np.arange(len(recording)), 0))]
+    held: Float64[np.ndarray, "frames"] = rng.random(len(recording))[
+        np.maximum.accumulate(np.where(fresh, np.arange(len(recording)), 0))
+    ]
     return held
 
 
@@ -60,7 +62,9 @@ def in_bursts(recording: Int64[np.ndarray, "frames"], rng: np.random.Generator) 
 def in_bad_recordings(recording: Int64[np.ndarray, "frames"], rng: np.random.Generator) -> Bool[np.ndarray, "frames"]:
     """A fifth of the recordings fail almost throughout, the others seldom; errors hold for ten frames on average."""
     bad = rng.random(int(recording[-1]) + 1) < BAD_RECORDINGS
-    wrong: Bool[np.ndarray, "frames"] = sticky_uniforms(recording, 10.0, rng) < np.where(bad, BAD_RATE, GOOD_RATE)[recording]
+    wrong: Bool[np.ndarray, "frames"] = (
+        sticky_uniforms(recording, 10.0, rng) < np.where(bad, BAD_RATE, GOOD_RATE)[recording]
+    )
     return wrong
 
 

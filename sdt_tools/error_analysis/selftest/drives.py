@@ -31,7 +31,10 @@ FASTEST_TURN_RAD: Final = 0.16
 
 @dataclass(frozen=True, eq=False)
 class Wander:
-    """What robot, operator and room do in each frame, one recording after the other."""
+    """What robot, operator and room do in each frame, one recording after the other.
+
+    ``far_m``: how far rays exceed what the safety domains allow, root mean square per ray.
+    """
 
     recording: Int64[np.ndarray, "frames"]
     operator_range_m: Float64[np.ndarray, "frames"]
@@ -39,7 +42,6 @@ class Wander:
     wall_range_m: Float64[np.ndarray, "frames"]
     heading_rad: Float64[np.ndarray, "frames"]
     far_m: Float64[np.ndarray, "frames"]
-    """How far the scan exceeds what the domains allow, root mean square per ray."""
     motion: Int64[np.ndarray, "frames"]
     speed_mps: Float64[np.ndarray, "frames"]
     invalid_share: Float64[np.ndarray, "frames"]
@@ -49,7 +51,10 @@ class Wander:
     def front_range_m(self) -> Float64[np.ndarray, "frames"]:
         """The nearest thing ahead: the wall, or the operator within 60°."""
         seen = np.abs(self.operator_bearing_rad) < FRONT_RAD
-        return np.minimum(self.wall_range_m, np.where(seen, self.operator_range_m, np.inf))
+        nearest_m: Float64[np.ndarray, "frames"] = np.minimum(
+            self.wall_range_m, np.where(seen, self.operator_range_m, np.inf)
+        )
+        return nearest_m
 
 
 def wander(rng: np.random.Generator, recordings: int, frames: int) -> Wander:
@@ -93,9 +98,7 @@ def predictions_of(wandered: Wander, rng: np.random.Generator) -> pl.DataFrame:
     front_m = wandered.front_range_m
     beyond_m = np.maximum(front_m - NEAR_M, 0.0) / np.sqrt(RAYS)
     allowed_m = {1: 0.02, 2: 0.05, 3: 0.1, 4: np.inf}
-    distances_m = {
-        level: np.hypot(beyond_m, np.maximum(wandered.far_m - allowed_m[level], 0.0)) for level in allowed_m
-    }
+    distances_m = {level: np.hypot(beyond_m, np.maximum(wandered.far_m - allowed_m[level], 0.0)) for level in allowed_m}
     columns = {
         "recording": np.char.add("drive_", np.char.zfill(number.astype(str), 3)),
         "recording_id": np.char.add("id-", number.astype(str)),
@@ -145,7 +148,9 @@ def room_outline(rng: np.random.Generator) -> Float64[np.ndarray, "directions"]:
     direction = np.linspace(0.0, 2 * np.pi, 4320, endpoint=False)
     waves = np.arange(1, 7)[:, None]
     phases, heights = rng.uniform(0, 2 * np.pi, (6, 1)), rng.normal(size=(6, 1)) / np.sqrt(waves)
-    outline: Float64[np.ndarray, "directions"] = np.exp(0.35 * (heights * np.sin(waves * direction + phases)).sum(axis=0))
+    outline: Float64[np.ndarray, "directions"] = np.exp(
+        0.35 * (heights * np.sin(waves * direction + phases)).sum(axis=0)
+    )
     return outline
 
 
@@ -171,7 +176,8 @@ def smooth_series(
         if step >= len(noise) - steps:
             out[step - len(noise) + steps] = second
     # The variance of noise through (1 - keep·B)^-2 is (1 + keep²) / (1 - keep²)³.
-    return (out * np.sqrt((1 - keep**2) ** 3 / (1 + keep**2))).T
+    series: Float64[np.ndarray, "rows steps"] = (out * np.sqrt((1 - keep**2) ** 3 / (1 + keep**2))).T
+    return series
 
 
 def lagging(target: Float64[np.ndarray, "recordings steps"]) -> Float64[np.ndarray, "recordings steps"]:

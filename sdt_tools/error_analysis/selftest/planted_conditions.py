@@ -40,7 +40,7 @@ class PlantedCondition:
 def choose_conditions(
     features: Features, recording: Int64[np.ndarray, "frames"], count: int, sharp: bool, rng: np.random.Generator
 ) -> tuple[PlantedCondition, ...]:
-    """Up to ``count`` random conditions of different features that hardly overlap; fewer where the features allow no more."""
+    """Up to ``count`` random conditions that hardly overlap; fewer where the features allow no more."""
     chosen: list[PlantedCondition] = []
     for _ in range(TRIES):
         if len(chosen) == count:
@@ -82,13 +82,13 @@ def _random_condition(features: Features, rng: np.random.Generator) -> Condition
     # One feature alone holds in fewer frames than one of two that must meet.
     smallest, largest = (0.05, 0.25) if count == 1 else (0.2, 0.5)
     return Condition(
-        tuple(part for name in chosen for part in _random_predicates(features, name, rng.uniform(smallest, largest), rng))
+        tuple(
+            part for name in chosen for part in _random_predicates(features, name, rng.uniform(smallest, largest), rng)
+        )
     )
 
 
-def _random_predicates(
-    features: Features, name: str, share: float, rng: np.random.Generator
-) -> tuple[Predicate, ...]:
+def _random_predicates(features: Features, name: str, share: float, rng: np.random.Generator) -> tuple[Predicate, ...]:
     """A bound, or in one of five an interval, on a number, with ``share`` of the frames inside; else a category."""
     if name in features.codes:
         return (Predicate(name, "=", str(rng.choice(features.categories[name]))),)

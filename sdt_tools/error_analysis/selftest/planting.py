@@ -78,7 +78,7 @@ def ground_of(frames: LabelledFrames, scans: Float32[np.ndarray, "frames rays"],
 
 @dataclass(frozen=True, eq=False)
 class Planted:
-    """``kind`` of each frame's error (a Kind, BACKGROUND or NOTHING), and the conditions behind the conditional ones."""
+    """The kind of each frame's error (a Kind, BACKGROUND or NOTHING), and the conditions behind conditional ones."""
 
     kind: Shaped[np.ndarray, "frames"]
     conditions: tuple[PlantedCondition, ...] = ()
@@ -180,9 +180,9 @@ def _lone(ground: Ground, planted: Planted, rows: Int64[np.ndarray, "rows"]) -> 
     """Those of ``rows``, in order, that lie outside conditions and have no error on them or beside them."""
     wrong, inside = planted.wrong.copy(), _inside(planted)
     frames, chosen = ground.frames, []
-    last = len(wrong) - 1
     for row in rows.tolist():
-        around = [at for at in (row - 1, row, row + 1) if 0 <= at <= last and frames.recording[at] == frames.recording[row]]
+        around = np.arange(max(row - 1, 0), min(row + 2, len(wrong)))
+        around = around[frames.recording[around] == frames.recording[row]]
         if not inside[row] and not wrong[around].any():
             wrong[row] = True
             chosen.append(row)

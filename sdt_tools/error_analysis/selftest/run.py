@@ -108,7 +108,7 @@ def run_selftest(
     material: Material | None = None,
     progress: Progress | None = None,
 ) -> SelfTest:
-    """``trials`` trials with planted conditions, a fifth as many with tags, and with ``null`` twice as many of each null.
+    """Trials of planted conditions, a fifth as many of tags, and, with ``null``, twice as many of each sort of chance.
 
     The same seed and material give the same counts, however many ``workers``. Raises UsageError where errors cannot be
     planted into the ``material`` (synthetic drives unless given).

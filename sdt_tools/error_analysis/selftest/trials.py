@@ -85,9 +85,7 @@ def null_trial(folder: Path, seed: int, trial: int, kind: str, material: Materia
     _write(folder, {"kind": kind, "found": [verdict.condition.text for verdict in search.confirmed]})
 
 
-def match(
-    planted: tuple[PlantedCondition, ...], found: list[Condition], features: Features
-) -> list[Condition | None]:
+def match(planted: tuple[PlantedCondition, ...], found: list[Condition], features: Features) -> list[Condition | None]:
     """For each planted condition a found one about the same features, on the same sides, with the same names.
 
     No found condition is counted twice; of several ways to pair them the one with the closest bounds is taken.
