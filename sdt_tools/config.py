@@ -1,14 +1,14 @@
 """Configuration: TOML files parsed once, at the edge, into frozen typed values.
 
-A key that does not exist is an error that names the nearest one that does. The resolved configuration is saved beside
-every result it shaped.
+A key that does not exist is an error that names the one that may be meant, or those that exist. The resolved
+configuration is saved beside every result it shaped.
 """
 
 import difflib
 import tomllib
 from collections.abc import Iterator, Mapping
 from pathlib import Path
-from typing import Any, TypeVar, get_args
+from typing import Any, Final, TypeVar, get_args
 
 import tomli_w
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
@@ -23,6 +23,8 @@ class Config(BaseModel):
 
     model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
 
+
+_MOST_KEYS: Final = 12
 
 ConfigT = TypeVar("ConfigT", bound=Config)
 
@@ -62,7 +64,7 @@ class RateConfig(Config):
 def load_config(model: type[ConfigT], path: Path | None) -> ConfigT:
     """Read ``path`` as TOML into ``model``; without a path, the defaults.
 
-    Raises ConfigError for a missing file, bad TOML, an unknown key (naming the nearest valid one) or a bad value.
+    Raises ConfigError for a missing file, bad TOML, an unknown key (naming valid ones) or a bad value.
     """
     return model() if path is None else parse_config(model, read_toml(path), str(path))
 
@@ -81,12 +83,18 @@ def read_toml(path: Path) -> dict[str, Any]:
         raise ConfigError(f"{path}: cannot be read: {error.strerror}; check path and rights") from None
 
 
-def parse_config(model: type[ConfigT], values: Mapping[str, Any], where: str) -> ConfigT:
-    """``values`` as ``model``. Raises ConfigError; ``where`` says in it where the values stood."""
+def parse_config(
+    model: type[ConfigT], values: Mapping[str, Any], where: str, options: Mapping[str, str] | None = None
+) -> ConfigT:
+    """``values`` as ``model``.
+
+    Raises ConfigError; ``where`` says in it where the values stood. Of settings that were given as ``options`` (by
+    their place, as ``rates.scan_hz``) it says the option instead.
+    """
     try:
         return model.model_validate(values)
     except ValidationError as error:
-        raise ConfigError(f"{where}: {_explain(model, error)}") from None
+        raise ConfigError(_explain(model, error, where, options or {})) from None
 
 
 def dump_config(config: Config) -> str:
@@ -94,17 +102,26 @@ def dump_config(config: Config) -> str:
     return tomli_w.dumps(config.model_dump(mode="json", exclude_none=True))
 
 
-def _explain(model: type[Config], error: ValidationError) -> str:
+def _explain(model: type[Config], error: ValidationError, where: str, options: Mapping[str, str]) -> str:
     unknown_keys = [one for one in error.errors() if one["type"] == "extra_forbidden"]
     first = (unknown_keys or error.errors())[0]  # a misspelt key is also a missing one
     place = ".".join(str(part) for part in _without_tags(model, first["loc"]))
     if first["type"] == "extra_forbidden":
-        near = difflib.get_close_matches(str(first["loc"][-1]), _keys_at(model, first["loc"][:-1]), n=1, cutoff=0.0)
-        return f"unknown key '{place}'" + (f"; did you mean '{near[0]}'?" if near else "")
+        known = _keys_at(model, first["loc"][:-1])
+        near = difflib.get_close_matches(str(first["loc"][-1]), known, n=1)
+        return f"{where}: unknown key '{place}'; " + (
+            f"did you mean '{near[0]}'?" if near else f"known: {_some(known)}"
+        )
+    named = options.get(place) or (f"{where}: '{place}'" if place else where)
     reason = str(first["msg"]).removeprefix("Value error, ")
     if first["type"] == "value_error":  # said by a rule of ours, which names what is wrong
-        return f"'{place}': {reason}" if place else reason
-    return f"'{place}': {reason[:1].lower()}{reason[1:]}, not {first['input']!r}"
+        return f"{named}: {reason}"
+    return f"{named}: {reason[:1].lower()}{reason[1:]}, not {first['input']!r}"
+
+
+def _some(keys: list[str]) -> str:
+    """At most a line of them."""
+    return ", ".join(keys[:_MOST_KEYS]) + (" …" if len(keys) > _MOST_KEYS else "")
 
 
 def _without_tags(model: type[BaseModel], place: tuple[int | str, ...]) -> list[int | str]:

@@ -54,10 +54,11 @@ class CheckpointError(UsageError):
 
 
 class OutputExistsError(UsageError):
-    """The output exists; nothing is ever written over unasked."""
+    """The output exists; nothing is ever written over unasked. ``option`` names it in the call, if one does."""
 
-    def __init__(self, path: Path) -> None:
-        super().__init__(f"{path} exists already; choose another --out, or move it away")
+    def __init__(self, path: Path, option: str | None = "--out") -> None:
+        advice = "move it away" if option is None else f"choose another {option}, or move it away"
+        super().__init__(f"{path} exists already; {advice}")
 
 
 class RunError(SdtError):

@@ -10,7 +10,7 @@ from enum import IntEnum
 from typing import Final
 
 import numpy as np
-from jaxtyping import Float64
+from jaxtyping import Float64, UInt8
 
 from sdt_tools.errors import UsageError
 
@@ -153,6 +153,19 @@ class CameraImage:
     stamp_ns: int
     data: bytes
     format: str = "jpeg"
+    frame_id: str = FRAME_CAMERA
+
+
+@dataclass(frozen=True, eq=False)
+class RawPicture:
+    """A picture as the camera gave it, blue, green, red, and when the host received it; ``stamp_ns`` is its grab time.
+
+    No recording holds it: whoever records makes a CameraImage of it. The pixels are not written to any more.
+    """
+
+    received_ns: int
+    stamp_ns: int
+    image_bgr_u8: UInt8[np.ndarray, "height width 3"]
     frame_id: str = FRAME_CAMERA
 
 

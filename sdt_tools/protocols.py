@@ -4,7 +4,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from typing import Protocol, runtime_checkable
 
-from sdt_tools.frames import CameraImage, LidarScan, MotionClass, Received, Twist
+from sdt_tools.frames import CameraImage, LidarScan, MotionClass, RawPicture, Received, Twist
 
 
 @dataclass(frozen=True)
@@ -45,8 +45,11 @@ class Source(Protocol):
         """Whether the source will give nothing more (a scenario that has ended); a robot never finishes."""
         ...
 
-    def read(self, until_ns: int) -> Iterable[Received]:
-        """Everything received after the last call and up to ``until_ns`` (inclusive), in order of ``received_ns``."""
+    def read(self, until_ns: int) -> Iterable[Received | RawPicture]:
+        """Everything received after the last call and up to ``until_ns`` (inclusive), in order of ``received_ns``.
+
+        Pictures may come raw: whoever records encodes them, beside what else it does.
+        """
         ...
 
     def close(self) -> None:

@@ -1,6 +1,7 @@
 """The command ``sdt``: its verbs, and the one place where errors become a line and an exit code."""
 
 import importlib
+import logging
 import os
 import sys
 from types import ModuleType
@@ -73,6 +74,7 @@ for _verb in VERBS:
 def main() -> None:
     """Run the command line; exit 2 for bad usage or input, 1 for a failure, 130 when interrupted."""
     use_one_thread()
+    logging.getLogger("sdt_tools").addHandler(logging.NullHandler())  # commands say themselves what is damaged
     try:
         code = app(standalone_mode=False)
     except SdtError as error:

@@ -46,7 +46,8 @@ def follow(
     from sdt_tools.view.attack_view import write_attack_rrd
 
     specification = specification_of(level, domains)
-    near = parse_config(NearScanConfig, {"centre_ray": ray, "radius_m": radius_m}, "the options")
+    options = {"centre_ray": "--ray", "radius_m": "--radius-m"}
+    near = parse_config(NearScanConfig, {"centre_ray": ray, "radius_m": radius_m}, "the options", options)
     loaded = load_checkpoint(model)
     frames = load_dataset(dataset).val if dataset else None
     folder = out or Path("analysis") / "attack" / loaded.name

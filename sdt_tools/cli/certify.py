@@ -97,15 +97,14 @@ def _show(done: "Certification") -> None:
     required = "" if told.required_margin is None else f"; a margin above {told.required_margin:.2g} logits certifies"
     console.print(f"judged in {told.seconds:.1f} s{required}")
     for reason in dict.fromkeys(verdict.error for verdict in done.ledger.verdicts if verdict.error):
-        console.print(f"error: {reason}", style="bold red", markup=False)
-    console.print(f"certificate with {FIGURE}: {done.out}", soft_wrap=True, markup=False)
+        console.print(f"error: {reason}", style="bold red")
+    console.print(f"certificate with {FIGURE}: {done.out}", soft_wrap=True)
     if done.export_check is not None:
         check = done.export_check
         console.print(
             f"export of {check.instances} domains, read back; logits within {check.max_logit_difference:.1g}, "
             f"{check.counterexamples} counterexamples confirmed: {done.export}",
             soft_wrap=True,
-            markup=False,
         )
 
 

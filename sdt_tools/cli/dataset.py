@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from sdt_tools.cli.console import JsonFlag, console, emit
+from sdt_tools.cli.console import JsonFlag, console, emit, print_incomplete
 
 if TYPE_CHECKING:
     from sdt_tools.dataset.build import DatasetSummary
@@ -72,7 +72,7 @@ def build(
     given = {name: value for name, value in options.items() if value is not None}
     file_values = {} if config is None else read_toml(config)
     settings = parse_config(DatasetConfig, file_values, str(config))
-    settings = parse_config(DatasetConfig, file_values | given, "the options")
+    settings = parse_config(DatasetConfig, file_values | given, "the options", {name: _option(name) for name in given})
     with progress_bar("reading recordings") as report:
         check = conflict_check(settings.conflict_level)
         summary = build_dataset(recordings, labels, settings, out, check, report, validation or ())
@@ -80,6 +80,10 @@ def build(
         emit(_document(summary))
     else:
         _show(summary)
+
+
+def _option(setting: str) -> str:
+    return f"--{setting.replace('_', '-')}"
 
 
 def _document(summary: "DatasetSummary") -> dict[str, object]:
@@ -94,7 +98,8 @@ def _document(summary: "DatasetSummary") -> dict[str, object]:
         "unmatched_labels": summary.unmatched_labels,
         "disputed_stamps": summary.disputed_stamps,
         "broken_lines": summary.broken_lines,
-        "damaged": list(summary.damaged),
+        "truncated": any(recording.truncated for recording in summary.incomplete),
+        "incomplete": [recording.document() for recording in summary.incomplete],
     }
 
 
@@ -111,9 +116,9 @@ def _show(summary: "DatasetSummary") -> None:
         "labels without a scan near enough": summary.unmatched_labels,
         "stamps left out because humans disagree": summary.disputed_stamps,
         "broken lines in journals, which count for nothing": summary.broken_lines,
-        "recordings cut or damaged, and read as far as that goes": len(summary.damaged),
     }
     for what, count in notes.items():
         if count:
             console.print(f"{what}: {count:,}", soft_wrap=True)
+    print_incomplete(summary.incomplete)
     console.print(f"{summary.folder} from {summary.recordings} recordings, hash {summary.hash[:16]}", soft_wrap=True)

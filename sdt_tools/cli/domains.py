@@ -11,18 +11,20 @@ from sdt_tools.cli.console import JsonFlag, console, emit
 def command(
     level: Annotated[int | None, typer.Option(help="Safety level, 1 to 4.")] = None,
     domains: Annotated[Path | None, typer.Option(metavar="FILE", help="TOML file with domains of your own.")] = None,
-    out: Annotated[Path | None, typer.Option(help="PNG to draw a domain of each set to.")] = None,
+    out: Annotated[
+        Path | None, typer.Option(metavar="PNG", help="Draw a domain of each set; it must not exist.")
+    ] = None,
     json_output: JsonFlag = False,
 ) -> None:
     """List safety domains, and draw them: the paper's levels, or a file of your own before it is trained on."""
     from sdt_tools.certify.specification import specification_of
-    from sdt_tools.errors import OutputExistsError
+    from sdt_tools.cli.pictures import check_picture
     from sdt_tools.robustness.figure import domains_figure
 
     specification = specification_of(level, domains)
     if out is not None:
-        if out.exists():
-            raise OutputExistsError(out)
+        check_picture(out, "--out")
+        out.parent.mkdir(parents=True, exist_ok=True)
         domains_figure(specification.sets, out)
     rows = [
         {

@@ -127,9 +127,9 @@ def _carry_out(plan: "Cut | Merge", labels: Path, json_output: bool) -> None:
 
 
 def _print(edited: "tuple[EditedRecording, ...]", journals: "tuple[FollowedJournal, ...]") -> None:
-    from rich.table import Table
+    from rich.table import Column, Table
 
-    table = Table("recording", "seconds", "messages", "carried to the beginning")
+    table = Table(Column("recording", overflow="fold"), "seconds", "messages", "carried to the beginning")
     for new in edited:
         table.add_row(str(new.out), f"{new.seconds:.3f}", f"{sum(new.messages.values()):,}", str(len(new.carried)))
     console.print(table)
@@ -143,6 +143,6 @@ def _print(edited: "tuple[EditedRecording, ...]", journals: "tuple[FollowedJourn
             console.print(f"{original.path}: is cut off; it was read up to where it stops", soft_wrap=True)
     damaged = dict.fromkeys((o.path, met) for new in edited for o in new.originals for met in o.damage)
     for path, met in damaged:
-        console.print(f"{path}: lost from {met.start_ns} to {met.end_ns} ns: {met.reason}", soft_wrap=True)
+        console.print(f"{path}: {met.text}", soft_wrap=True)
     for journal in journals:
         console.print(f"{journal.path}: {journal.acts:,} of {journal.given:,} acts", soft_wrap=True)

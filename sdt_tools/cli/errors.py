@@ -5,15 +5,20 @@ from typing import Annotated
 
 import typer
 
-from sdt_tools.cli.console import JsonFlag, console, emit
+from sdt_tools.cli import errors_claims, errors_compare, errors_selftest
+from sdt_tools.cli.console import JsonFlag, console, emit, print_incomplete
 from sdt_tools.cli.default_command import WithDefault
-from sdt_tools.cli.errors_selftest import selftest
 
 app = typer.Typer(
     cls=WithDefault,
     no_args_is_help=True,
     help="Say of every wrong frame why it is wrong. Without a sub-command named: analyse.",
 )
+
+
+app.command("claims")(errors_claims.command)
+app.command("compare")(errors_compare.command)
+app.command("selftest")(errors_selftest.command)
 
 
 @app.callback()
@@ -33,14 +38,17 @@ def analyse(
     config: Annotated[Path | None, typer.Option(help="TOML file of options, such as loss, eta and epsilon_m.")] = None,
     json_output: JsonFlag = False,
 ) -> None:
-    """Tag every wrong frame: systematic, conditional (and on what), transient, isolated or unexplained."""
+    """Tag every wrong frame: systematic, conditional (and on what), transient, isolated or unexplained.
+
+    While it works, the scans lie in a nameless file beside --out, 2.2 kB each: they need not fit in memory.
+    """
     from sdt_tools.cli.progress import progress_bar
     from sdt_tools.config import load_config
     from sdt_tools.error_analysis.analyse import analyse_errors
     from sdt_tools.error_analysis.definitions import ErrorOptions
 
     options = load_config(ErrorOptions, config)
-    with progress_bar("reading scans") as progress:
+    with progress_bar("scans, then neighbours") as progress:
         report = analyse_errors(predictions, recordings, options, out, model, progress)
     if json_output:
         emit({**report.document(), "out": str(out)})
@@ -68,8 +76,6 @@ def analyse(
     else:
         console.print(report.note or "no condition was confirmed")
     for warning in report.warnings:
-        console.print(f"[yellow]{warning}")
+        console.print(warning, style="yellow")
+    print_incomplete(report.incomplete)
     console.print(f"written to {out}", soft_wrap=True)
-
-
-app.command("selftest")(selftest)

@@ -11,7 +11,7 @@ if TYPE_CHECKING:
     from sdt_tools.error_analysis.selftest.run import SelfTest
 
 
-def selftest(
+def command(
     seed: Annotated[int, typer.Option(min=0, help="Seed of all trials.")] = 1000,
     trials: Annotated[
         int, typer.Option(min=1, help="Trials with planted conditions; a fifth as many (whole drives) judge the tags.")

@@ -60,6 +60,6 @@ def _report(summary: "ExportSummary", json_output: bool) -> None:
     for topic, count in summary.left_out.items():
         console.print(f"left out: {topic}, {count} messages, is no topic of ours")
     if summary.truncated:
-        console.print("cut off: the recording has no end; what could be read went out")
+        console.print("the recording was cut off; what could be read went out; `sdt repair` finishes it")
     for damage in summary.damage:
-        console.print(f"damaged: from {damage.start_ns} to {damage.end_ns} ns: {damage.reason}")
+        console.print(damage.text, soft_wrap=True)

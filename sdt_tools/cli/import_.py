@@ -58,8 +58,8 @@ def ros2(
         bool, typer.Option("--resample", help="Take scans of any geometry: for each of our rays the nearest of theirs.")
     ] = False,
     jpeg_quality: Annotated[
-        int, typer.Option(min=1, max=100, help="Of uncompressed pictures, which become JPEG.")
-    ] = 95,
+        int | None, typer.Option(min=1, max=100, help="Of uncompressed pictures, which become JPEG. [95]")
+    ] = None,
     lossless: Annotated[
         bool,
         typer.Option("--lossless", help="Uncompressed pictures become PNG: about ten times the bytes, every pixel."),
@@ -77,15 +77,18 @@ def ros2(
     pictures stay as they are.
     """
     from sdt_tools.config import MotionConfig, parse_config, read_toml
+    from sdt_tools.errors import UsageError
     from sdt_tools.recording.exchange.ros2.importing import import_ros2
     from sdt_tools.recording.exchange.ros2.inward import Taking
     from sdt_tools.recording.exchange.ros2.pictures import LOSSLESS, PictureFormat
     from sdt_tools.recording.exchange.ros2.routes import Wanted
 
+    if lossless and jpeg_quality is not None:
+        raise UsageError("--lossless and --jpeg-quality: choose one, PNG or a quality of JPEG")
     table = {} if config is None else read_toml(config).get("motions", {})
     taking = Taking(
         resample,
-        LOSSLESS if lossless else PictureFormat("jpeg", jpeg_quality),
+        LOSSLESS if lossless else PictureFormat("jpeg", 95 if jpeg_quality is None else jpeg_quality),
         parse_config(MotionConfig, table, f"{config}: motions"),
     )
     summary = import_ros2(bag, out, Wanted(scan_topic, image_topic, command_topic, odometry_topic), taking)
@@ -100,7 +103,7 @@ def ros2(
     for topic, count in summary.unreadable.items():
         console.print(f"{topic}: {count} messages cannot be used and were left out")
     for left, reason in summary.left_out.items():
-        console.print(f"left out: {left.name} ({left.type_name}, {left.messages} messages): {reason}")
+        console.print(f"left out: {left.name} ({left.type_name}, {left.messages} messages): {reason}", soft_wrap=True)
 
 
 @app.command("parquet")

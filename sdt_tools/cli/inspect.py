@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from sdt_tools.cli.console import JsonFlag, console, emit
+from sdt_tools.cli.console import JsonFlag, console, emit, print_incomplete
 
 if TYPE_CHECKING:
     from sdt_tools.recording.inspect import InspectReport
@@ -27,8 +27,11 @@ def command(
     of the period, the delay to the host varies by under 50 ms and drifts by under 100 ppm, 99 % of the images have a
     scan within 20 ms. Poor: 1 %, 1 s, 50 %, 200 ms, 1000 ppm, 90 %; stamps that run backwards; damage. Fair: between.
     """
+    from sdt_tools.cli.pictures import check_picture
     from sdt_tools.recording.inspect import draw_timing, inspect_recording
 
+    if plot is not None:
+        check_picture(plot, "--plot")
     report = inspect_recording(file, full)
     if plot is not None:
         draw_timing(report, plot)
@@ -44,21 +47,18 @@ def _print(report: "InspectReport", plot: Path | None) -> None:
     _print_metadata(report)
     if report.foreign_topics:
         console.print(f"passed over: {', '.join(report.foreign_topics)}")
-    if report.truncated:
-        console.print("cut off: the file has no end; what is listed is what can be read")
-    for damage in report.damage:
-        console.print(f"damaged: from {damage.start_ns} to {damage.end_ns} ns: {damage.reason}")
+    print_incomplete([report.incomplete])
     for line in report.disagreements:
-        console.print(f"disagreement: {line}", markup=False)
+        console.print(f"disagreement: {line}", soft_wrap=True)
     _print_health(report)
     if plot is not None:
         console.print(f"drawn: {plot}", soft_wrap=True)
 
 
 def _print_topics(report: "InspectReport") -> None:
-    from rich.table import Table
+    from rich.table import Column, Table
 
-    topics = Table("topic", "schema", "messages", "per second", "drops")
+    topics = Table(Column("topic", no_wrap=True), Column("schema", overflow="fold"), "messages", "per second", "drops")
     timing = Table("topic", "gaps", "longest ms", "jitter ms", "delay ms", "drift ppm")
     for name, topic in report.topics.items():
         known = report.topic_document(name)
@@ -81,23 +81,24 @@ def _print_topics(report: "InspectReport") -> None:
 
 
 def _print_metadata(report: "InspectReport") -> None:
-    from rich.markup import escape
     from rich.table import Table
 
     metadata = Table("metadata", "value")
     for name, value in {**report.session, **report.stats}.items():
         if value and not name.startswith(("count.", "timing.")):  # the tables above say it
-            metadata.add_row(name, escape(value))
+            metadata.add_row(name, value)
     if metadata.row_count:
         console.print(metadata)
 
 
 def _print_health(report: "InspectReport") -> None:
+    from rich.text import Text
+
     colours = {"good": "green", "fair": "yellow", "poor": "red"}
     source = "counted from the messages" if report.counted else "by its own stats; --full counts again"
-    console.print(f"[bold {colours[report.health]}]{report.health}[/] ({source})")
+    console.print(Text.assemble((report.health, f"bold {colours[report.health]}"), f" ({source})"))
     for reason in report.reasons:
-        console.print(f"  {reason.health}: {reason.text}", markup=False)
+        console.print(f"  {reason.health}: {reason.text}", soft_wrap=True)
 
 
 def _number(value: object) -> str:

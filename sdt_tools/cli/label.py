@@ -6,7 +6,7 @@ from typing import Annotated
 
 import typer
 
-from sdt_tools.cli.console import JsonFlag, console, emit
+from sdt_tools.cli.console import JsonFlag, console, emit, print_incomplete
 
 app = typer.Typer(no_args_is_help=True, help="Label recordings; labels lie in journals that are only ever added to.")
 
@@ -57,6 +57,7 @@ def auto(
             report(done, len(recordings))
             summaries.append(label_automatically(recording, LabelKind(kind), sources[source], labels))
     broken = [(summary.journal, line) for summary in summaries for line in summary.broken_lines]
+    incomplete = [summary.incomplete for summary in summaries if summary.incomplete is not None]
     counts = {name: sum(summary.counts[name] for summary in summaries) for name in LabelKind(kind).classes}
     if json_output:
         emit(
@@ -67,6 +68,8 @@ def auto(
                 "skipped": sum(summary.skipped for summary in summaries),
                 "counts": counts,
                 "broken_lines": [f"{journal}:{line}" for journal, line in broken],
+                "truncated": any(recording.truncated for recording in incomplete),
+                "incomplete": [recording.document() for recording in incomplete],
                 "journals": [str(summary.journal) for summary in summaries],
             }
         )
@@ -78,5 +81,6 @@ def auto(
         table.add_row(str(summary.journal), f"{summary.labels:,}", f"{summary.appended:,}", f"{summary.skipped:,}")
     console.print(table)
     console.print(", ".join(f"{name} {count:,}" for name, count in counts.items()))
+    print_incomplete(incomplete)
     for journal, line in broken:
         console.print(f"{journal}:{line}: the line is broken off; it is kept, and counts for nothing", soft_wrap=True)

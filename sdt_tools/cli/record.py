@@ -21,6 +21,9 @@ KEYS_HELP = (
     "stops, x discards it (or the last one) to the trash, m marks the moment, s saves what --keep-last holds, q quits."
 )
 
+_OPTIONS = {name: f"--{name}" for name in ("scenario", "seed", "seconds", "driver")} | {"keep_last_s": "--keep-last"}
+"""Options that stand for a setting, by its name."""
+
 app = typer.Typer(no_args_is_help=True, help="Record scans, images, poses and commands in step into one MCAP file.")
 
 
@@ -95,7 +98,7 @@ def scene(
     from sdt_tools.cli.drivers import make_driver
 
     assert out is not None
-    recording = parse_config(SceneRecordingConfig, values, "record scene")
+    recording = parse_config(SceneRecordingConfig, values, "record scene", _OPTIONS)
     with recording_progress(f"recording {out.name}") as progress:
         summary = record_scene(recording, out, make_driver, progress=progress)
     with _last_words(summary.ending):
@@ -113,7 +116,7 @@ def _scene_session(
     from sdt_tools.recording.live.scene_takes import SceneTakesConfig
 
     keep_last_s = None if keep_last is None else seconds_of(keep_last)
-    config = parse_config(SceneTakesConfig, {**values, "keep_last_s": keep_last_s}, "record scene")
+    config = parse_config(SceneTakesConfig, {**values, "keep_last_s": keep_last_s}, "record scene", _OPTIONS)
     summary = record_takes(config, folder, resume)
     with _last_words(summary.ending):
         if json_output:

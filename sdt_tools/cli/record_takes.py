@@ -39,7 +39,7 @@ def record_takes(config: "SceneTakesConfig", folder: Path, resume: bool) -> "Ses
             return record_scene_takes(config, folder, make_driver, resume, control, progress=progress)
     except ChangedConfigError as error:
         for line in error.differences:
-            console.print(line, markup=False, highlight=False)
+            console.print(line, soft_wrap=True)
         raise
 
 
@@ -76,14 +76,13 @@ def session_document(summary: "SessionSummary") -> dict[str, object]:
 
 def print_session(summary: "SessionSummary") -> None:
     """The session for people."""
-    from rich.markup import escape
     from rich.table import Column, Table
 
     table = Table(Column("take", no_wrap=True), "seconds", "messages", "dropped", "missing", "ended by", "")
     for take in summary.record.takes:
-        remark = "discarded" if take.trash else escape(take.trigger)
+        remark = "discarded" if take.trash else take.trigger
         numbers = (f"{take.seconds:.1f}", str(take.messages), str(take.dropped), str(take.missing))
         table.add_row(take.name, *numbers, take.ending or "cut off", remark)
     console.print(table)
     for path in summary.cut_off:
-        console.print(f"{path} was cut off; `sdt repair` makes a whole file of it", markup=False)
+        console.print(f"{path} was cut off; `sdt repair` makes a whole file of it", soft_wrap=True)

@@ -3,7 +3,8 @@
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 
-from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
+from rich.progress import BarColumn, Progress, Task, TextColumn, TimeElapsedColumn, TimeRemainingColumn
+from rich.text import Text
 
 from sdt_tools.cli.console import console
 from sdt_tools.recording.live.disk import WARNING_S
@@ -11,6 +12,14 @@ from sdt_tools.recording.live.outcome import RecordingProgress
 from sdt_tools.recording.messages.topics import CAMERA_IMAGE, LIDAR_SCAN
 
 _SHOWN = {LIDAR_SCAN: "scans", CAMERA_IMAGE: "images"}
+
+
+class _Remaining(TimeRemainingColumn):
+    """The time that is left; nothing where nobody knows the end."""
+
+    def render(self, task: Task) -> Text:
+        """As ``eta 0:00:12``."""
+        return Text() if task.total is None else Text("eta ") + super().render(task)
 
 
 @contextmanager
@@ -21,8 +30,7 @@ def recording_progress(what: str) -> Iterator[Callable[[RecordingProgress], None
         BarColumn(),
         TextColumn("{task.fields[state]}"),
         TimeElapsedColumn(),
-        TextColumn("eta"),
-        TimeRemainingColumn(),
+        _Remaining(),
     )
     bar = Progress(*columns, console=console, transient=True, disable=not console.is_terminal)
     task = bar.add_task(what, total=None, state="")
@@ -42,7 +50,7 @@ def describe(now: RecordingProgress) -> str:
     lost = [f"{now.dropped} dropped"] if now.dropped else []
     missing = [f"{now.missing} missing"] if now.missing else []
     late = [f"{now.missed_deadlines} late"] if now.missed_deadlines else []
-    size = [f"{now.recorded_s:.1f} s", *rates, f"{now.size_bytes / 1e6:.1f} MB"]
+    size = [f"{now.recorded_s:.1f} s", *rates, f"{now.size_bytes / 1e6:.1f} MB"] if now.size_bytes else []
     return ", ".join([*state, *size, *lost, *missing, *late, *_disk(now.disk_left_s)])
 
 

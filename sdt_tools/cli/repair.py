@@ -40,6 +40,6 @@ def _print(report: "RepairReport") -> None:
     if report.truncated:
         console.print("the original has no end; it was saved up to where it stops")
     for damage in report.damage:
-        console.print(f"lost: from {damage.start_ns} to {damage.end_ns} ns: {damage.reason}")
+        console.print(damage.text, soft_wrap=True)
     state = "there was nothing to repair; the copy is whole" if report.sound else "repaired, and read back"
-    console.print(f"{report.out}: {state}")
+    console.print(f"{report.out}: {state}", soft_wrap=True)

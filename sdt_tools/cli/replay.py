@@ -6,7 +6,7 @@ from typing import Annotated
 
 import typer
 
-from sdt_tools.cli.console import JsonFlag, console, emit
+from sdt_tools.cli.console import JsonFlag, console, emit, print_incomplete
 
 
 class Every(StrEnum):
@@ -37,10 +37,14 @@ def command(
     with progress_bar("replaying") as progress:
         summary = replay(loaded, recordings, labels, out, config, model, progress)
     if json_output:
-        emit({**vars(summary), "frames_per_s": round(summary.frames_per_s), "accuracy": summary.accuracy})
+        told = {
+            "truncated": summary.truncated,
+            "incomplete": [recording.document() for recording in summary.incomplete],
+            "frames_per_s": round(summary.frames_per_s),
+            "accuracy": summary.accuracy,
+        }
+        emit(vars(summary) | told)
         return
-    from rich.markup import escape
-
     console.print(
         f"{summary.frames:,} frames of {summary.recordings} recordings answered by {summary.model} "
         f"({summary.frames_per_s:,.0f} a second): {summary.out}",
@@ -50,12 +54,8 @@ def command(
         console.print("no labels, so no losses" if labels is None else "none of these frames has a label")
     else:
         console.print(f"{summary.labelled:,} labelled, {summary.wrong:,} wrong: accuracy {summary.accuracy:.1%}")
-    for what, names in (
-        ("without a label journal", summary.without_journal),
-        ("cut off, read as far as they go", summary.truncated),
-        ("with damaged chunks", summary.damaged),
-    ):
-        if names:
-            console.print(f"[yellow]{what}: {escape(', '.join(names))}")
+    if summary.without_journal:
+        console.print(f"without a label journal: {', '.join(summary.without_journal)}", style="yellow")
+    print_incomplete(summary.incomplete)
     if summary.labels_without_scan:
-        console.print(f"[yellow]{summary.labels_without_scan} labels lie at stamps without a scan")
+        console.print(f"{summary.labels_without_scan} labels lie at stamps without a scan", style="yellow")

@@ -16,6 +16,15 @@ app = typer.Typer(no_args_is_help=True, help="Train networks on data sets.")
 
 _OF_DOMAINS = {"safety.inner": "--inner", "safety.weight": "--lambda", "safety.delta": "--delta"}
 """Options that say how a network is held to safety domains, by the setting that each stands for."""
+_OPTIONS = _OF_DOMAINS | {
+    "arch": "--arch",
+    "seed": "--seed",
+    "specification.level": "--level",
+    "specification.domains": "--domains",
+    "specification.epsilon_m": "--epsilon-m",
+    "loop.epochs": "--epochs",
+}
+"""All options that stand for a setting."""
 
 
 @app.callback()
@@ -122,10 +131,11 @@ def _settings(config: Path | None, asked: "Mapping[str, object]") -> "FollowTrai
     if config is not None:
         base = load_config(FollowTrainingConfig, config)
     else:
-        wanted = {name.partition(".")[2]: value for name, value in asked.items() if name.startswith("specification.")}
-        base = recipe_for(
-            parse_config(SpecificationConfig, wanted, "the options"), str(asked.get("arch", "plain")), "--arch"
-        )
+        prefix = "specification."
+        wanted = {name.removeprefix(prefix): value for name, value in asked.items() if name.startswith(prefix)}
+        options = {name.removeprefix(prefix): option for name, option in _OPTIONS.items() if name.startswith(prefix)}
+        specification = parse_config(SpecificationConfig, wanted, "the options", options)
+        base = recipe_for(specification, str(asked.get("arch", "plain")), "--arch")
     values = base.model_dump(mode="json", exclude_none=True)
     for name, value in asked.items():
         *tables, key = name.split(".")
@@ -133,7 +143,8 @@ def _settings(config: Path | None, asked: "Mapping[str, object]") -> "FollowTrai
         for step in tables:
             table = table[step]
         table[key] = value
-    settings = parse_config(FollowTrainingConfig, values, "the options")
+    given = {name: option for name, option in _OPTIONS.items() if name in asked}
+    settings = parse_config(FollowTrainingConfig, values, "the options", given)
     idle = [option for name, option in _OF_DOMAINS.items() if name in asked]
     if idle and settings.specification.empty:
         raise UsageError(

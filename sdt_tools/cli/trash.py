@@ -16,7 +16,7 @@ RECORDINGS = Path("recordings")
 @app.command("list")
 def list_(folder: Dir = RECORDINGS, json_output: JsonFlag = False) -> None:
     """List what is in the trash, oldest first."""
-    from rich.table import Table
+    from rich.table import Column, Table
 
     from sdt_tools.recording.trash import trashed
 
@@ -34,11 +34,16 @@ def list_(folder: Dir = RECORDINGS, json_output: JsonFlag = False) -> None:
         ]
         emit({"trash": document})
         return
-    table = Table("name", "from", "MB", "why")
+    table = Table(Column("name", no_wrap=True, overflow="fold"), Column("from", overflow="fold"), "MB", "why")
     for entry in entries:
-        origin = "unknown" if entry.discarded_ns is None else str(entry.files[0].origin)
+        origin = "unknown" if entry.discarded_ns is None else _seen_from_here(entry.files[0].origin)
         table.add_row(entry.name, origin, f"{entry.size_bytes / 1e6:.1f}", entry.reason)
     console.print(table if entries else f"{folder}: its trash is empty")
+
+
+def _seen_from_here(path: Path) -> str:
+    here = Path.cwd()
+    return str(path.relative_to(here) if path.is_relative_to(here) else path)
 
 
 @app.command("restore")

@@ -5,7 +5,7 @@ from typing import Annotated
 
 import typer
 
-from sdt_tools.cli.console import JsonFlag, console, emit
+from sdt_tools.cli.console import JsonFlag, console, emit, print_incomplete
 
 
 def command(
@@ -37,7 +37,12 @@ def command(
 
         open_window([target])
     if json_output:
-        emit({**vars(summary), "size_bytes": target.stat().st_size})
+        told = {
+            "truncated": summary.truncated,
+            "incomplete": None if summary.incomplete is None else summary.incomplete.document(),
+            "size_bytes": target.stat().st_size,
+        }
+        emit(vars(summary) | told)
         return
     models = f", models: {', '.join(summary.models)}" if summary.models else ""
     console.print(
@@ -45,7 +50,7 @@ def command(
         f"({target.stat().st_size / 1e6:.1f} MB in {summary.seconds:.1f} s)",
         soft_wrap=True,
     )
-    if summary.truncated:
-        console.print("[yellow]the recording was cut off; it is shown as far as it goes")
+    if summary.incomplete is not None:
+        print_incomplete([summary.incomplete])
     if not open_:
         console.print(f"look at it with: rerun {target}", soft_wrap=True)

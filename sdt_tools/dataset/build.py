@@ -23,6 +23,7 @@ from sdt_tools.dataset.manifest import MANIFEST_FILE, Conflict, Used, manifest_t
 from sdt_tools.dataset.select import TRAIN, VAL, Selection, select_frames
 from sdt_tools.errors import DatasetError, OutputExistsError
 from sdt_tools.labeling.vocabulary import LabelKind
+from sdt_tools.recording.incomplete import Incomplete
 from sdt_tools.recording.reader import Recording
 from sdt_tools.runs.local import Progress
 
@@ -50,8 +51,8 @@ class DatasetSummary:
     """Stamps left out because humans disagree about them."""
     broken_lines: int
     """Journal lines that crashes broke off."""
-    damaged: tuple[str, ...]
-    """Recordings that were cut or damaged, and read as far as that goes."""
+    incomplete: tuple[Incomplete, ...]
+    """Recordings that were cut off or damaged, and read as far as they go."""
 
 
 def build_dataset(
@@ -115,7 +116,7 @@ def build_dataset(
         unmatched_labels=sum(recording.unmatched for recording in labelled),
         disputed_stamps=sum(recording.disputed for recording in labelled),
         broken_lines=sum(recording.broken_lines for recording in labelled),
-        damaged=tuple(entry.path.stem for entry in labelled if entry.truncated or entry.damaged),
+        incomplete=tuple(entry.incomplete for entry in labelled if entry.incomplete is not None),
     )
 
 

@@ -12,6 +12,7 @@ from sdt_tools.dataset.config import DatasetConfig
 from sdt_tools.labeling.journal import read_journal
 from sdt_tools.labeling.resolve import disagreements, resolve
 from sdt_tools.labeling.vocabulary import LabelKind, journal_path
+from sdt_tools.recording.incomplete import Incomplete, incomplete
 from sdt_tools.recording.pairing import nearest_pairs
 from sdt_tools.recording.reader import Recording
 from sdt_tools.runs.unit import content_hash
@@ -41,10 +42,8 @@ class LabelledRecording:
     """Stamps without a label because humans disagree."""
     broken_lines: int
     """Journal lines that a crash broke off."""
-    truncated: bool
-    """Whether the recording was cut, and read as far as it goes."""
-    damaged: int
-    """Chunks of the recording that could not be read."""
+    incomplete: Incomplete | None
+    """What is missing of the recording, where it was cut off or is damaged."""
 
     @property
     def unmatched(self) -> int:
@@ -64,7 +63,7 @@ def read_labelled(path: Path, labels_dir: Path, config: DatasetConfig) -> Labell
         scenario = recording.session.get("scenario", "")
         acts = read_journal(journal, recording_id)
         batches = [batch.stamps_ns.copy() for batch in recording.scan_batches(SCANS_A_BATCH)]
-        truncated, damaged = recording.truncated, len(recording.damage)
+        missing = incomplete(recording)
     labels = resolve(acts)
     scan_stamps_ns = np.concatenate(batches) if batches else np.empty(0, dtype=np.int64)
     by_time = np.argsort(scan_stamps_ns, kind="stable")
@@ -86,6 +85,5 @@ def read_labelled(path: Path, labels_dir: Path, config: DatasetConfig) -> Labell
         labels=len(labels),
         disputed=disagreements(acts)["stamp_ns"].n_unique(),
         broken_lines=len(acts.broken_lines),
-        truncated=truncated,
-        damaged=damaged,
+        incomplete=missing,
     )

@@ -9,8 +9,10 @@ from jaxtyping import Float32
 from sdt_tools.error_analysis.definitions import ErrorOptions
 from sdt_tools.error_analysis.distance import situations
 from sdt_tools.error_analysis.labelled import LabelledFrames
+from sdt_tools.error_analysis.scratch import scratch_scans
 from sdt_tools.errors import RecordingError
 from sdt_tools.frames import RAYS
+from sdt_tools.recording.incomplete import Incomplete, incomplete
 from sdt_tools.recording.reader import Recording
 from sdt_tools.runs.local import Progress
 
@@ -38,13 +40,21 @@ def find_recordings(frames: LabelledFrames, places: Sequence[Path]) -> tuple[Pat
 
 
 def read_situations(
-    frames: LabelledFrames, paths: Sequence[Path], options: ErrorOptions, progress: Progress | None = None
-) -> Float32[np.ndarray, "frames rays"]:
-    """The situation of each frame; ``paths`` are the recordings in the order of ``frames``.
+    frames: LabelledFrames,
+    paths: Sequence[Path],
+    options: ErrorOptions,
+    progress: Progress | None = None,
+    scratch: Path | None = None,
+) -> tuple[Float32[np.ndarray, "frames rays"], tuple[Incomplete, ...]]:
+    """The situation of each frame, and the recordings that are cut off or damaged.
 
-    Raises RecordingError where a recording cannot be read or lacks the scan of a frame.
+    ``paths`` are the recordings in the order of ``frames``. With ``scratch``, a folder, the situations lie in a
+    nameless file there (``scratch_scans``), else in memory. Raises RecordingError where a recording cannot be read or
+    lacks the scan of a frame.
     """
-    scans = np.empty((len(frames.loss), RAYS), np.float32)
+    total = len(frames.loss)
+    scans = scratch_scans(scratch, total) if scratch else np.empty((total, RAYS), np.float32)
+    missing = []
     starts = np.searchsorted(frames.recording, np.arange(len(paths) + 1))
     for number, path in enumerate(paths):
         if progress:
@@ -58,6 +68,7 @@ def read_situations(
                 found = wanted_ns[np.minimum(rows, len(wanted_ns) - 1)] == batch.stamps_ns
                 scans[first + rows[found]] = situations(batch.ranges_m[found], options)
                 filled[rows[found]] = True
+            missing.append(incomplete(recording))
         if not filled.all():
             raise RecordingError(
                 f"{path}: lacks the scans of {int((~filled).sum())} of {len(filled)} frames of the predictions; "
@@ -65,7 +76,7 @@ def read_situations(
             )
     if progress:
         progress(len(paths), len(paths))
-    return scans
+    return scans, tuple(one for one in missing if one is not None)
 
 
 def _identities(frames: LabelledFrames) -> list[tuple[str, str]]:

@@ -13,6 +13,7 @@ from sdt_tools.frames import CameraImage, Mode, MotionCommand, OperatorState
 from sdt_tools.labeling.journal import Journal
 from sdt_tools.labeling.resolve import standing
 from sdt_tools.labeling.vocabulary import LabelKind, LabelSource, journal_path
+from sdt_tools.recording.incomplete import Incomplete, incomplete
 from sdt_tools.recording.live.perturb import PERTURBATION
 from sdt_tools.recording.messages.topics import CAMERA_IMAGE, COMMAND, OPERATOR_STATE
 from sdt_tools.recording.reader import Recording
@@ -42,6 +43,8 @@ class AutoLabelSummary:
     """Labels found, by class."""
     broken_lines: tuple[int, ...]
     """Lines of the journal that a crash had broken off."""
+    incomplete: Incomplete | None
+    """What is missing of the recording, where it was cut off or is damaged."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -64,6 +67,7 @@ def label_automatically(recording: Path, kind: LabelKind, source: AutoSource, la
     with Recording.open(recording) as opened:
         recording_id = opened.recording_id
         found = _find(opened, kind, source)
+        missing = incomplete(opened)
     path = journal_path(labels_dir, recording.stem, kind)
     with Journal(path, recording_id) as journal:
         fresh = found.table.with_columns(pl.lit(str(source)).alias("source"), pl.col("stamp_ns").alias("created_ns"))
@@ -79,6 +83,7 @@ def label_automatically(recording: Path, kind: LabelKind, source: AutoSource, la
         skipped=found.skipped,
         counts={name: int(counts.get(name, 0)) for name in kind.classes},
         broken_lines=journal.broken_lines,
+        incomplete=missing,
     )
 
 

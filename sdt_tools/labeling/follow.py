@@ -4,7 +4,6 @@ The journals of the originals are only read. A new recording's journal holds the
 their order, with the new recording's id; labeler, source and time stay.
 """
 
-import shutil
 from array import array
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
@@ -19,11 +18,12 @@ from sdt_tools.labeling.journal import Journal, read_journal
 from sdt_tools.labeling.resolve import standing
 from sdt_tools.labeling.vocabulary import LabelKind, journal_path
 from sdt_tools.recording.container.reader import McapReader
-from sdt_tools.recording.editing.edit import Finished, edit_under_way
+from sdt_tools.recording.editing.edit import Finished, edit_recordings, edit_under_way
 from sdt_tools.recording.editing.plan import Cut, Merge
 from sdt_tools.recording.editing.provenance import EditedRecording
 from sdt_tools.recording.messages.topics import CAMERA_IMAGE, LIDAR_SCAN
 from sdt_tools.recording.reader import recording_id_of
+from sdt_tools.recording.scratch import give_name, scratch_folder
 from sdt_tools.recording.trash import discard
 
 _FRAMES = {LabelKind.MOTION: LIDAR_SCAN, LabelKind.GESTURE: CAMERA_IMAGE}
@@ -52,10 +52,11 @@ def edit_with_labels(
         for out in plan.outs:
             if journal_path(labels_dir, out.stem, kind).exists():
                 raise OutputExistsError(journal_path(labels_dir, out.stem, kind))
-    scratch = labels_dir / f".{plan.outs[0].name}.labels"
-    with _journals_in_place_of(scratch), edit_under_way(plan) as finished:
+    if all(table.is_empty() for table in acts.values()):
+        return edit_recordings(plan), ()
+    with _journals_beside(labels_dir / plan.outs[0].name) as scratch, edit_under_way(plan) as finished:
         edited = tuple(new.edited for new in finished)
-        journals = tuple(journal for new in finished for journal in _follow(new, acts, scratch))
+        journals = tuple(journal for new in finished for journal in _follow(new, acts, labels_dir, scratch))
     return edited, journals
 
 
@@ -121,21 +122,17 @@ def _check_agree(said: pl.DataFrame, news: pl.DataFrame, before: Path, path: Pat
 
 
 @contextmanager
-def _journals_in_place_of(scratch: Path) -> Iterator[None]:
-    """The journals in ``scratch`` come to lie beside it when the block ends without an error; else they go."""
-    shutil.rmtree(scratch, ignore_errors=True)  # of an edit that was interrupted
-    try:
-        yield
-        for part in sorted(scratch.iterdir()) if scratch.is_dir() else ():
-            path = scratch.parent / part.name
-            if path.exists():
-                raise OutputExistsError(path)
-            part.rename(path)
-    finally:
-        shutil.rmtree(scratch, ignore_errors=True)
+def _journals_beside(place: Path) -> Iterator[Path]:
+    """A folder whose journals come to lie beside ``place`` when the block ends without an error; else they go."""
+    with scratch_folder(place) as scratch:
+        yield scratch
+        for part in sorted(scratch.iterdir()):
+            give_name(part, place.parent / part.name)
 
 
-def _follow(new: Finished, acts: Mapping[LabelKind, pl.DataFrame], scratch: Path) -> Iterator[FollowedJournal]:
+def _follow(
+    new: Finished, acts: Mapping[LabelKind, pl.DataFrame], labels_dir: Path, scratch: Path
+) -> Iterator[FollowedJournal]:
     """Write the journals of ``new`` into ``scratch``."""
     for kind, table in acts.items():
         about = table if table.is_empty() else table.filter(pl.col("stamp_ns").is_in(_stamps(new.path, kind).implode()))
@@ -143,7 +140,7 @@ def _follow(new: Finished, acts: Mapping[LabelKind, pl.DataFrame], scratch: Path
             part = journal_path(scratch, new.edited.out.stem, kind)
             with Journal(part, new.edited.recording_id) as journal:
                 journal.append_table(about)
-            yield FollowedJournal(scratch.parent / part.name, len(about), len(table))
+            yield FollowedJournal(labels_dir / part.name, len(about), len(table))
 
 
 def _stamps(recording: Path, kind: LabelKind) -> pl.Series:

@@ -1,7 +1,7 @@
 """Files made from other files: every record taken over as it is, into a file that is whole or not there."""
 
 from collections.abc import Iterator
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager
 from pathlib import Path
 
 from mcap.reader import make_reader
@@ -10,8 +10,12 @@ from mcap.records import Channel
 from sdt_tools.errors import OutputExistsError, RecordingError
 from sdt_tools.recording.container.file import McapFile
 from sdt_tools.recording.container.reader import McapReader, RawEntry
-from sdt_tools.recording.messages.topics import CAMERA_IMAGE
+from sdt_tools.recording.messages.topics import CAMERA_IMAGE, is_ours
+from sdt_tools.recording.scratch import give_name, scratch_folder
 from sdt_tools.recording.session import SOFTWARE
+from sdt_tools.recording.timing.pauses import PAUSES, Pauses, pauses_text
+from sdt_tools.recording.timing.stamps import StampLog
+from sdt_tools.recording.timing.summary import timing_entries, timing_of
 
 
 class RecordCopy:
@@ -24,6 +28,13 @@ class RecordCopy:
     def __init__(self, file: McapFile) -> None:
         self._file = file
         self._numbers: dict[tuple[object, ...], int] = {}
+        self._ours: dict[int, str] = {}
+        self._stamps = StampLog()
+
+    @property
+    def has_ours(self) -> bool:
+        """Whether topics of ours are among those that were announced."""
+        return bool(self._ours)
 
     def announce(self, source: McapReader, channel: Channel) -> int:
         """The number of ``channel`` of ``source`` in the new file."""
@@ -47,6 +58,8 @@ class RecordCopy:
                 encoding=channel.message_encoding,
                 metadata=channel.metadata,
             )
+            if is_ours(channel.topic, name, channel.message_encoding):
+                self._ours[number] = channel.topic
         return number
 
     def take(self, source: McapReader, entry: RawEntry) -> None:
@@ -55,10 +68,18 @@ class RecordCopy:
         number = self.announce(source, channel)
         compress = channel.topic != CAMERA_IMAGE  # JPEG does not compress
         self._file.add_message(number, entry.log_ns, entry.publish_ns, entry.data, compress)
+        if number in self._ours:
+            self._stamps.see(self._ours[number], entry.log_ns, entry.publish_ns)
+
+    def stats(self, pauses: Pauses) -> dict[str, str]:
+        """Entries of ``sdt.stats``: counts, timing and ``pauses`` of what is in the file by now."""
+        counts = {f"count.{topic}": str(count) for topic, count in self._file.counts.items()}
+        told = {PAUSES: pauses_text(pauses)} if pauses else {}
+        return counts | told | timing_entries(timing_of(self._stamps, pauses))
 
 
 @contextmanager
-def new_file(out: Path) -> Iterator[McapFile]:
+def new_file(out: Path, library: str = SOFTWARE, profile: str = "") -> Iterator[McapFile]:
     """A file to be written at ``out``, which appears there only when it is finished and another reader has read it.
 
     Raises OutputExistsError where ``out`` exists, RecordingError where the disk refuses or what was written does not
@@ -66,21 +87,16 @@ def new_file(out: Path) -> Iterator[McapFile]:
     """
     if out.exists():
         raise OutputExistsError(out)
-    part = out.with_name(f".{out.name}.part")
-    part.unlink(missing_ok=True)
-    file = McapFile(part, SOFTWARE)
-    try:
-        yield file
-        file.finish()
-        file.close()
+    with scratch_folder(out) as scratch:
+        part = scratch / out.name
+        file = McapFile(part, library, profile=profile)
+        try:
+            yield file
+            file.finish()
+        finally:
+            file.close()
         check_readable(part, sum(file.counts.values()))
-        if out.exists():
-            raise OutputExistsError(out)
-        part.rename(out)
-    finally:
-        file.close()
-        with suppress(FileNotFoundError):
-            part.unlink()
+        give_name(part, out)
 
 
 def check_readable(path: Path, messages: int) -> None:

@@ -7,11 +7,11 @@ from pathlib import Path
 from sdt_tools.clock import SECOND_NS
 from sdt_tools.errors import OutputExistsError
 from sdt_tools.recording.container.reader import Damage
+from sdt_tools.recording.incomplete import Incomplete
 from sdt_tools.recording.reader import Recording
 from sdt_tools.recording.summary import TopicSummary
 from sdt_tools.recording.timing.document import pairs_document, topic_document
 from sdt_tools.recording.timing.health import FileState, Health, Reason, health_reasons, verdict
-from sdt_tools.recording.timing.pauses import pauses_of
 from sdt_tools.recording.timing.summary import Timing, disagreements, has_timing, noted_timing, timing_of
 
 
@@ -49,6 +49,11 @@ class InspectReport:
     def messages(self) -> int:
         """Messages of all our topics."""
         return sum(topic.count for topic in self.topics.values())
+
+    @property
+    def incomplete(self) -> Incomplete:
+        """What there is to say where it is cut off or damaged."""
+        return Incomplete(self.path, self.truncated, self.start_ns, self.end_ns, self.messages, self.damage)
 
     @property
     def health(self) -> Health:
@@ -97,7 +102,7 @@ def inspect_recording(path: Path, full: bool = False) -> InspectReport:
     """
     with Recording.open(path) as recording:
         noted = None if full or not recording.counted else _noted(recording)
-        timing = noted or timing_of(recording.stamps(), pauses_of(recording.stats))
+        timing = noted or timing_of(recording.stamps(), recording.pauses)
         topics = recording.topics if noted is not None else _counted_topics(recording, timing)
         differences = _differences(recording, timing) if full else ()
         return InspectReport(
@@ -123,16 +128,16 @@ def inspect_recording(path: Path, full: bool = False) -> InspectReport:
 def draw_timing(report: InspectReport, out: Path) -> None:
     """Draw the timing of the recording that ``report`` is of to the PNG ``out``; all its messages are counted for it.
 
-    Raises OutputExistsError where ``out`` exists, RunError where it cannot be written.
+    Raises OutputExistsError where ``out`` exists, DiskRefusedError where it cannot be written.
     """
     from sdt_tools.recording.timing.figure import timing_figure  # matplotlib takes a while to import
 
     if out.exists():
-        raise OutputExistsError(out)
+        raise OutputExistsError(out, "--plot")
     with Recording.open(report.path) as recording:
-        stamps = recording.stamps()
+        stamps, pauses = recording.stamps(), recording.pauses
     title = f"{report.path.name}: {report.duration_s:.1f} s, {report.health}"
-    timing_figure(stamps, pauses_of(report.stats), out, title)
+    timing_figure(stamps, pauses, out, title)
 
 
 def dropped_by_recorder(stats: Mapping[str, str]) -> dict[str, int]:

@@ -1,23 +1,28 @@
 """Recordings, read: streaming, a chunk at a time, whole or cut off or damaged."""
 
-import zlib
+from collections import Counter
 from collections.abc import Collection, Iterator, Mapping
 from functools import cached_property
 from pathlib import Path
 from types import TracebackType
 from typing import Final
 
+from isal.isal_zlib import crc32
+
 from sdt_tools.errors import RecordingError
-from sdt_tools.frames import Received
+from sdt_tools.frames import Message, Received
 from sdt_tools.recording.container.extents import Extent
-from sdt_tools.recording.container.reader import Damage, McapReader, overlapping
+from sdt_tools.recording.container.reader import Damage, McapReader, RawEntry
 from sdt_tools.recording.messages.codec import decode
-from sdt_tools.recording.messages.topics import LIDAR_SCAN, TOPICS, is_ours
+from sdt_tools.recording.messages.topics import LIDAR_SCAN, TOPIC_BY_NAME, TOPICS, Topic, is_ours
 from sdt_tools.recording.series import ScanSeries, joined
 from sdt_tools.recording.session import CONFIG_NAME, SESSION, STATS, derived_id
 from sdt_tools.recording.summary import TopicSummary
+from sdt_tools.recording.timing.pauses import Pauses, pauses_in
 from sdt_tools.recording.timing.stamps import StampLog, read_stamps
 
+ROS2: Final = "ros2"
+"""The profile of an MCAP that is a ROS 2 bag."""
 SCAN_BATCH: Final = 4096
 """Scans in a batch unless told otherwise: 18 MB."""
 SCAN_MIN_BYTES: Final = 17
@@ -40,11 +45,15 @@ class Recording:
             if is_ours(channel.topic, self._file.schema_name(channel), channel.message_encoding)
         }
         if not self._ours and not self.session:
+            is_bag = self._file.header.profile == ROS2
             self.close()
+            if self.truncated and not channels:
+                raise RecordingError(f"{path}: was cut off before its first topic; nothing can be read of it")
+            advice = "`sdt import ros2` makes a recording of the bag" if is_bag else "check that it is a recording"
             found = ", ".join(sorted({channel.topic for channel in channels.values()})) or "no topics at all"
             raise RecordingError(
                 f"{path}: holds none of our topics ({', '.join(topic.name for topic in TOPICS[:2])} …) in our schemas; "
-                f"it has {found}; check that it is a recording"
+                f"it has {found}; {advice}"
             )
 
     @classmethod
@@ -95,6 +104,11 @@ class Recording:
         return self._metadata(STATS)
 
     @property
+    def pauses(self) -> Pauses:
+        """When nothing was recorded because somebody wanted it so; half-open, in host time."""
+        return pauses_in(self._file)
+
+    @property
     def recording_id(self) -> str:
         """The recording's UUID; for files without one, derived from how they begin."""
         return self._recording_id
@@ -140,6 +154,15 @@ class Recording:
         return read_stamps(self._file, {number: channel.topic for number, channel in self._ours.items()})
 
     @property
+    def foreign_counts(self) -> Mapping[str, int]:
+        """Messages of topics that are passed over, by topic."""
+        counts: Counter[str] = Counter()
+        for number, channel in self._file.channels.items():
+            if number not in self._ours:
+                counts[channel.topic] += self._file.extents[number].count
+        return dict(sorted(counts.items()))
+
+    @property
     def foreign_topics(self) -> tuple[str, ...]:
         """Topics in the file that are passed over."""
         return tuple(sorted({c.topic for number, c in self._file.channels.items() if number not in self._ours}))
@@ -149,31 +172,38 @@ class Recording:
     ) -> Iterator[Received]:
         """Messages of ``topics`` (all of ours without) received in ``[start_ns, end_ns)``, in order of receipt.
 
-        Raises RecordingError for a message that does not parse.
+        One that does not parse is left out, and named in ``damage``.
         """
         for entry in self._file.entries(self._numbers(topics), start_ns, end_ns):
-            channel = self._ours[entry.channel_id]
-            schema = self._file.schema_name(channel)
-            yield Received(entry.log_ns, decode(channel.topic, schema, entry.data, entry.publish_ns))
+            message = decoded(self._file, entry)
+            if message is not None:
+                yield Received(entry.log_ns, message)
+
+    def entries(
+        self, topics: Collection[str] | None = None, start_ns: int | None = None, end_ns: int | None = None
+    ) -> Iterator[tuple[Topic, RawEntry]]:
+        """The same, not decoded: whoever finds one that does not parse calls ``lose``."""
+        for entry in self._file.entries(self._numbers(topics), start_ns, end_ns):
+            yield TOPIC_BY_NAME[self._ours[entry.channel_id].topic], entry
+
+    def lose(self, topic: Topic, entry: RawEntry) -> None:
+        """Name in ``damage`` a message of ``topic`` that does not parse."""
+        self._file.lose(entry.offset, entry.start, entry.log_ns, not_valid(topic.name, topic.schema))
 
     def scans(self) -> ScanSeries:
         """All scans as one series, 4.3 kB a scan, in order of receipt; no scans make an empty series.
 
-        Raises RecordingError where a scan has another number of rays than 541.
+        A message that is no scan is left out, and named in ``damage``. Raises RecordingError where a scan has another
+        number of rays than 541, unless it lies among others in a chunk that no checksum vouches for: that is damage.
         """
         return joined(list(self.scan_batches(self._expected_scans() or SCAN_BATCH)))
 
     def scan_batches(self, size: int = SCAN_BATCH) -> Iterator[ScanSeries]:
         """The same in batches of ``size``, the last one smaller; one batch and one chunk are in memory at a time."""
         # numba takes most of a second to import, and only arrays of scans need it
-        from sdt_tools.recording.scans import batches_from_chunks, batches_from_messages
+        from sdt_tools.recording.scans import scan_batches
 
-        wanted = self._numbers((LIDAR_SCAN,))
-        segments = self._file.segments(wanted)
-        if overlapping(segments):
-            return batches_from_messages(self.messages((LIDAR_SCAN,)), size, self.path)
-        chunks = (data for segment in segments if (data := self._file.unpacked(segment)) is not None)
-        return batches_from_chunks(chunks, wanted, size, self.path)
+        return scan_batches(self._file, self._numbers((LIDAR_SCAN,)), size)
 
     def _metadata(self, name: str) -> Mapping[str, str]:
         found = [record.metadata for record in self._file.metadata if record.name == name]
@@ -189,7 +219,23 @@ class Recording:
         return count if count * SCAN_MIN_BYTES <= self.size_bytes else 0
 
 
+def decoded(file: McapReader, entry: RawEntry) -> Message | None:
+    """The message in ``entry``, on a topic of ours; None, and named in the damage of ``file``, where it is damaged."""
+    channel = file.channels[entry.channel_id]
+    schema = file.schema_name(channel)
+    try:
+        return decode(channel.topic, schema, entry.data, entry.publish_ns)
+    except RecordingError:
+        file.lose(entry.offset, entry.start, entry.log_ns, not_valid(channel.topic, schema))
+        return None
+
+
+def not_valid(topic: str, schema: str) -> str:
+    """The reason by which damaged messages are named in a file's damage."""
+    return f"messages on {topic} that are not a valid {schema}"
+
+
 def recording_id_of(file: McapReader) -> str:
     """The UUID of the recording in ``file``, as ``Recording.recording_id`` has it, whatever topics are in it."""
     said = [record.metadata.get("recording_id", "") for record in file.metadata if record.name == SESSION]
-    return (said[-1] if said else "") or derived_id("foreign", str(file.size_bytes), str(zlib.crc32(file.beginning)))
+    return (said[-1] if said else "") or derived_id("foreign", str(file.size_bytes), str(crc32(file.beginning)))

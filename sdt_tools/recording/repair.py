@@ -10,10 +10,10 @@ from sdt_tools.errors import RecordingError
 from sdt_tools.recording.container.reader import Damage, McapReader
 from sdt_tools.recording.copying import RecordCopy, new_file
 from sdt_tools.recording.messages.topics import is_ours
+from sdt_tools.recording.reader import decoded
 from sdt_tools.recording.session import STATS
-from sdt_tools.recording.timing.pauses import pauses_of
-from sdt_tools.recording.timing.stamps import StampLog
-from sdt_tools.recording.timing.summary import ENTRY, timing_entries, timing_of
+from sdt_tools.recording.timing.pauses import pauses_in
+from sdt_tools.recording.timing.summary import ENTRY
 
 REPAIRED: Final = "sdt.repair"
 
@@ -53,35 +53,41 @@ class RepairReport:
 def repair_recording(path: Path, out: Path) -> RepairReport:
     """Take all that can be read of ``path``, topics of others too, over into the new file ``out``.
 
-    The original is only read. The file says in its metadata ``sdt.repair`` what was wrong with the original; its
-    ``sdt.stats``, where it had some, are taken over with their counts and timing put right.
+    The original is only read. Profile and library stay. The file says in its metadata ``sdt.repair`` what was wrong
+    with the original; ``sdt.stats`` are taken over with their counts and timing put right, and where a cut has taken
+    them, they are counted, and the pauses read from the log.
     Raises OutputExistsError where ``out`` exists; RecordingError for a path that is missing or not an MCAP, that holds
     nothing to save, and where the repaired file does not read back: then there is none.
     """
-    with McapReader(path) as source, new_file(out) as file:
+    with McapReader(path) as source, new_file(out, source.header.library, source.header.profile) as file:
         copy = RecordCopy(file)
         for attached in source.attachments():
-            file.add_attachment(attached.name, attached.media_type, attached.data, attached.log_time)
+            file.add_attachment(
+                attached.name, attached.media_type, attached.data, attached.log_time, attached.create_time
+            )
         for record in source.metadata:
             if record.name not in (STATS, REPAIRED):
                 file.add_metadata(record.name, record.metadata)
         for channel in source.channels.values():
             copy.announce(source, channel)
-        ours, stamps = _our_topics(source), StampLog()
+        ours = frozenset(
+            number
+            for number, channel in source.channels.items()
+            if is_ours(channel.topic, source.schema_name(channel), channel.message_encoding)
+        )
         for entry in source.entries():
+            if entry.channel_id in ours and not source.is_checked(entry.offset) and decoded(source, entry) is None:
+                continue  # in the new file a checksum would vouch for it
             copy.take(source, entry)
-            if entry.channel_id in ours:
-                stamps.see(ours[entry.channel_id], entry.log_ns, entry.publish_ns)
         file.finish_chunks()
         messages = file.counts
         if not source.channels and not source.metadata:
             raise RecordingError(f"{path}: nothing in it can be read; there is nothing to save")
         report = RepairReport(path, out, messages, source.truncated, source.damage, _lost(source, messages))
         stats = [dict(record.metadata) for record in source.metadata if record.name == STATS]
-        if stats:
-            counts = {f"count.{topic}": str(count) for topic, count in messages.items()}
-            kept = {name: text for name, text in stats[-1].items() if not name.startswith(ENTRY)}
-            file.add_metadata(STATS, kept | counts | timing_entries(timing_of(stamps, pauses_of(kept))))
+        if stats or copy.has_ours:
+            kept = {name: text for name, text in (stats or [{}])[-1].items() if not name.startswith(ENTRY)}
+            file.add_metadata(STATS, kept | copy.stats(pauses_in(source)))
         file.add_metadata(
             REPAIRED,
             {
@@ -91,14 +97,6 @@ def repair_recording(path: Path, out: Path) -> RepairReport:
             },
         )
     return report
-
-
-def _our_topics(source: McapReader) -> dict[int, str]:
-    return {
-        number: channel.topic
-        for number, channel in source.channels.items()
-        if is_ours(channel.topic, source.schema_name(channel), channel.message_encoding)
-    }
 
 
 def _lost(source: McapReader, messages: Mapping[str, int]) -> dict[str, int] | None:

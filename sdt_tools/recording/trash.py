@@ -100,7 +100,7 @@ def restore(folder: Path, name: str) -> tuple[Path, ...]:
         raise UsageError(f"{entry.folder / RECORD}: cannot be read; nobody knows where its files came from")
     for file in entry.files:
         if file.origin.exists() and not file.origin.samefile(file.path):
-            raise OutputExistsError(file.origin)
+            raise OutputExistsError(file.origin, None)
     try:
         for file in reversed(entry.files):  # the recording last: while it is here, what is left of it is found here
             file.origin.parent.mkdir(parents=True, exist_ok=True)

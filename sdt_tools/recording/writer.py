@@ -37,6 +37,8 @@ from sdt_tools.recording.timing.summary import timing_entries, timing_of
 
 FLUSH_NS: Final = SECOND_NS // 2
 SYNC_NS: Final = SECOND_NS
+SYNC_BYTES: Final = 16 << 20
+"""As fast as it can, a recording has the disk take so much at a time while it goes on, not all of it at close."""
 
 
 class RecordingWriter:
@@ -74,8 +76,9 @@ class RecordingWriter:
         self._realtime = realtime
         self._monotonic_ns = monotonic_ns
         self._flushed_ns = self._synced_ns = monotonic_ns()
-        self._syncer = ThreadPoolExecutor(1, "recording-sync") if realtime else None
+        self._syncer = ThreadPoolExecutor(1, "recording-sync")
         self._sync: Future[None] | None = None
+        self._synced_bytes = 0
         self._closed = False
         self._refused = False
         self._file = McapFile(path, SOFTWARE, chunk_bytes)
@@ -123,10 +126,12 @@ class RecordingWriter:
             raise
         if self._realtime:
             self.keep_safe()
+        elif self._file.size - self._synced_bytes >= SYNC_BYTES:
+            self._start_sync()
 
     def keep_safe(self) -> None:
         """In real time, flush where half a second has passed, sync where one has; call it also when nothing arrives."""
-        if self._syncer is None:
+        if not self._realtime:
             return
         now_ns = self._monotonic_ns()
         if now_ns - self._flushed_ns < FLUSH_NS:
@@ -137,9 +142,7 @@ class RecordingWriter:
             self._refused = True
             raise
         self._flushed_ns = now_ns
-        if now_ns - self._synced_ns >= SYNC_NS and (self._sync is None or self._sync.done()):
-            self._check_sync()
-            self._sync = self._syncer.submit(self._file.sync)
+        if now_ns - self._synced_ns >= SYNC_NS and self._start_sync():
             self._synced_ns = now_ns
 
     def note(self, stats: Mapping[str, str]) -> None:
@@ -155,9 +158,8 @@ class RecordingWriter:
             return
         self._closed = True
         try:
-            if self._syncer is not None:
-                self._syncer.shutdown(wait=True)
-                self._check_sync()
+            self._syncer.shutdown(wait=True)
+            self._check_sync()
         finally:
             try:
                 refusal = self._finish()
@@ -191,6 +193,15 @@ class RecordingWriter:
         """For a file that holds less than was written, which only the file can tell."""
         with McapReader(self.path) as file:
             return read_stamps(file, {number: topic for topic, number in self._channels.items()})
+
+    def _start_sync(self) -> bool:
+        """Have the disk take what was handed over, in a thread; False while it is still at it."""
+        if self._sync is not None and not self._sync.done():
+            return False
+        self._check_sync()
+        self._sync = self._syncer.submit(self._file.sync)
+        self._synced_bytes = self._file.size
+        return True
 
     def _check_sync(self) -> None:
         error = self._sync.exception() if self._sync is not None else None

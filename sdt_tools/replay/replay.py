@@ -18,6 +18,7 @@ from sdt_tools.config import Config
 from sdt_tools.errors import LabelError, OutputExistsError, RecordingError, UsageError
 from sdt_tools.labeling.resolve import read_labels
 from sdt_tools.labeling.vocabulary import LabelKind, journal_path
+from sdt_tools.recording.incomplete import Incomplete, incomplete
 from sdt_tools.recording.messages.topics import LIDAR_SCAN
 from sdt_tools.recording.reader import Recording
 from sdt_tools.replay.predictions import CLASSES_KEY, FORMAT_KEY, FORMAT_VERSION, SCHEMA
@@ -38,8 +39,8 @@ class ReplayConfig(Config):
 class ReplaySummary:
     """What a replay did; nothing is passed over silently.
 
-    ``labels_without_scan`` counts labels at whose stamp there is no scan. ``without_journal``, ``truncated`` (read as
-    far as they go) and ``damaged`` (with lost chunks) name recordings.
+    ``labels_without_scan`` counts labels at whose stamp there is no scan. ``without_journal`` names recordings;
+    ``incomplete`` ones were read as far as they go.
     """
 
     out: Path
@@ -50,14 +51,18 @@ class ReplaySummary:
     wrong: int
     labels_without_scan: int
     without_journal: tuple[str, ...]
-    truncated: tuple[str, ...]
-    damaged: tuple[str, ...]
+    incomplete: tuple[Incomplete, ...]
     seconds: float
 
     @property
     def frames_per_s(self) -> float:
         """Frames a second, file to Parquet."""
         return self.frames / max(self.seconds, 1e-9)
+
+    @property
+    def truncated(self) -> bool:
+        """Whether a recording was cut off."""
+        return any(recording.truncated for recording in self.incomplete)
 
     @property
     def accuracy(self) -> float | None:
@@ -69,8 +74,7 @@ class ReplaySummary:
 class _Tally:
     counts: Counter[str] = field(default_factory=Counter)
     without_journal: list[str] = field(default_factory=list)
-    truncated: list[str] = field(default_factory=list)
-    damaged: list[str] = field(default_factory=list)
+    incomplete: list[Incomplete] = field(default_factory=list)
 
 
 def replay(
@@ -120,8 +124,7 @@ def replay(
         wrong=tally.counts["wrong"],
         labels_without_scan=tally.counts["labels_without_scan"],
         without_journal=tuple(tally.without_journal),
-        truncated=tuple(tally.truncated),
-        damaged=tuple(tally.damaged),
+        incomplete=tuple(tally.incomplete),
         seconds=seconds,
     )
 
@@ -161,10 +164,9 @@ def _replay_one(
         rows = predict_recording(model, recording, labels, config.frames, config.batch)
         if rows.is_empty() and (config.frames == "all" or not labels.is_empty()):
             raise RecordingError(f"{path}: has no scans on {LIDAR_SCAN} to replay; leave it out")
-        if recording.truncated:
-            tally.truncated.append(path.stem)
-        if recording.damage:
-            tally.damaged.append(path.stem)
+        missing = incomplete(recording)
+        if missing is not None:
+            tally.incomplete.append(missing)
     labelled = len(rows) - rows["label"].null_count()
     tally.counts.update(
         frames=len(rows),

@@ -131,13 +131,6 @@ def gesture_of_arms(gestures: Sequence[GestureEvent], time_s: float) -> tuple[Ge
     return Gesture.IDLE, 1.0
 
 
-def encode_jpeg(image_bgr_u8: UInt8[np.ndarray, "height width 3"], quality: int = 80) -> bytes:
-    """``image_bgr_u8`` as a JPEG file."""
-    done, data = cv2.imencode(".jpg", image_bgr_u8, [cv2.IMWRITE_JPEG_QUALITY, quality])
-    assert done, "an 8-bit picture always encodes"
-    return bytes(data)
-
-
 def _bounds_m(layout: Layout) -> Float64[np.ndarray, "4"]:
     """x0, y0, x1, y1 around everything in ``layout``."""
     points = np.concatenate(

@@ -8,13 +8,13 @@ from sdt_tools.frames import (
     FRAME_BASE,
     FRAME_CAMERA,
     CameraCalibration,
-    CameraImage,
     FrameTransform,
     Message,
     OperatorState,
     Pose2D,
+    RawPicture,
 )
-from sdt_tools.scene.camera import SceneCamera, encode_jpeg, gesture_of_arms
+from sdt_tools.scene.camera import SceneCamera, gesture_of_arms
 from sdt_tools.scene.world import STEP_S, World
 
 
@@ -33,7 +33,7 @@ class SceneFilm:
         yield FrameTransform(self._start_ns, FRAME_BASE, FRAME_CAMERA, mount.translation_m, mount.rotation_xyzw)
         yield CameraCalibration(self._start_ns, lens.width, lens.height, lens.fx, lens.fy, lens.cx, lens.cy)
 
-    def pictures(self, now_ns: int, robot_before: Pose2D, operator_before: Pose2D) -> Iterator[Message]:
+    def pictures(self, now_ns: int, robot_before: Pose2D, operator_before: Pose2D) -> Iterator[Message | RawPicture]:
         """The pictures due up to ``now_ns``, each from the robot's place at its stamp; and the gesture."""
         world = self._world
         period_ns = SECOND_NS / world.config.rates.image_hz
@@ -52,7 +52,7 @@ class SceneFilm:
                 self._taken,
             )
             self._taken += 1
-            yield CameraImage(stamp_ns, encode_jpeg(picture))
+            yield RawPicture(stamp_ns, stamp_ns, picture)
             yield OperatorState(stamp_ns, world.gesture_at(time_s), world.commanded_mode_at(time_s))
 
 

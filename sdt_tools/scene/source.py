@@ -16,6 +16,7 @@ from sdt_tools.frames import (
     OperatorPose,
     OperatorState,
     Pose2D,
+    RawPicture,
     Received,
     Twist,
 )
@@ -39,7 +40,7 @@ class Film(Protocol):
         """Where the camera is, and its lens."""
         ...
 
-    def pictures(self, now_ns: int, robot_before: Pose2D, operator_before: Pose2D) -> Iterator[Message]:
+    def pictures(self, now_ns: int, robot_before: Pose2D, operator_before: Pose2D) -> Iterator[Message | RawPicture]:
         """The pictures due since the last call, and at each one's stamp what the operator shows."""
         ...
 
@@ -99,13 +100,13 @@ class SceneSource:
     def close(self) -> None:
         """A scene holds nothing open."""
 
-    def read(self, until_ns: int) -> Iterator[Received]:
+    def read(self, until_ns: int) -> Iterator[Received | RawPicture]:
         """Move the world on to ``until_ns`` and yield what is sensed on the way."""
         while not self.finished and (now_ns := self._start_ns + self._ticks * _STEP_NS) <= until_ns:
-            for message in self._tick(now_ns):
-                yield Received(message.stamp_ns, message)
+            for sensed in self._tick(now_ns):
+                yield sensed if isinstance(sensed, RawPicture) else Received(sensed.stamp_ns, sensed)
 
-    def _tick(self, now_ns: int) -> Iterator[Message]:
+    def _tick(self, now_ns: int) -> Iterator[Message | RawPicture]:
         """Advance to the tick at ``now_ns`` and say what has been sensed since the last one."""
         world = self.world
         robot_before, operator_before = world.robot, world.operator

@@ -13,6 +13,7 @@ import rerun as rr
 from sdt_tools.config import MotionConfig
 from sdt_tools.errors import OutputExistsError, UsageError
 from sdt_tools.frames import RAYS, CameraImage
+from sdt_tools.recording.incomplete import Incomplete, incomplete
 from sdt_tools.recording.messages.topics import CAMERA_IMAGE
 from sdt_tools.recording.reader import Recording
 from sdt_tools.view.blueprint import Content, blueprint
@@ -32,7 +33,7 @@ SCANS_ON_MAP: Final = 150
 
 @dataclass(frozen=True)
 class ViewSummary:
-    """What went into an .rrd. ``lanes`` are entities; a recording that is ``truncated`` is shown as far as it goes."""
+    """What went into an .rrd. ``lanes`` are entities; an ``incomplete`` recording is shown as far as it goes."""
 
     out: Path
     recording_id: str
@@ -41,8 +42,13 @@ class ViewSummary:
     images: int
     models: tuple[str, ...]
     lanes: tuple[str, ...]
-    truncated: bool
+    incomplete: Incomplete | None
     seconds: float
+
+    @property
+    def truncated(self) -> bool:
+        """Whether the recording was cut off."""
+        return self.incomplete is not None and self.incomplete.truncated
 
 
 def write_rrd(
@@ -87,7 +93,7 @@ def write_rrd(
             images=images,
             models=tuple(track.model for track in story.models),
             lanes=tuple(lane.entity for lane in story.lanes),
-            truncated=source.truncated,
+            incomplete=incomplete(source),
             seconds=time.perf_counter() - began,
         )
 

@@ -6,7 +6,8 @@ import math
 from pytest_benchmark.fixture import BenchmarkFixture
 
 from sdt_tools.frames import Gesture, Pose2D
-from sdt_tools.scene.camera import SceneCamera, encode_jpeg
+from sdt_tools.recording.live.encoder import encode_jpeg
+from sdt_tools.scene.camera import SceneCamera
 from sdt_tools.scene.scenario import layout_for
 
 

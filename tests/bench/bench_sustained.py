@@ -1,7 +1,7 @@
 """Recording in real time for minutes: what is dropped, and how much of a core it takes.
 
-``SDT_SUSTAINED_S`` sets the seconds; without it, one minute. Pictures are prepared, so that no rendering counts; each
-becomes a JPEG as it comes, as a camera's driver makes it.
+``SDT_SUSTAINED_S`` sets the seconds; without it, one minute. Pictures are prepared, so that no rendering counts; they
+come raw, as from a camera, and the recording encodes them.
 """
 
 import math
@@ -16,13 +16,14 @@ from pytest_benchmark.fixture import BenchmarkFixture
 
 from sdt_tools.clock import SECOND_NS, HostClock
 from sdt_tools.config import MotionConfig, RateConfig
-from sdt_tools.frames import CameraImage, Gesture, LidarScan, MotionClass, Pose2D, Received, Twist
+from sdt_tools.frames import CameraImage, Gesture, LidarScan, MotionClass, Pose2D, RawPicture, Received, Twist
 from sdt_tools.protocols import Observation, SourceInfo
+from sdt_tools.recording.live.encoder import encode_jpeg
 from sdt_tools.recording.live.record import record
 from sdt_tools.recording.messages.topics import CAMERA_IMAGE, LIDAR_SCAN
 from sdt_tools.recording.reader import Recording
 from sdt_tools.recording.writer import RecordingWriter
-from sdt_tools.scene.camera import SceneCamera, encode_jpeg
+from sdt_tools.scene.camera import SceneCamera
 from sdt_tools.scene.scenario import layout_for
 
 SECONDS = float(os.environ.get("SDT_SUSTAINED_S", "60"))
@@ -32,16 +33,18 @@ RATES = RateConfig()
 
 
 class PreparedSource:
-    """Scans at 50 Hz and ready pictures at 30, by the host's time; ``burst`` more pictures come at once."""
+    """Scans at 50 Hz and raw pictures at 30, by the host's time; ``burst`` more come at once, raw or encoded."""
 
-    def __init__(self, clock: HostClock, pictures: np.ndarray, scans_m: np.ndarray, burst: int = 0) -> None:
+    def __init__(
+        self, clock: HostClock, pictures: np.ndarray, scans_m: np.ndarray, burst: int = 0, raw_burst: bool = False
+    ) -> None:
         self.info = SourceInfo("bench")
         self.start_ns = clock.now_ns()
         self.finished = False
-        self._pictures, self._scans_m, self._burst = pictures, scans_m, burst
+        self._pictures, self._scans_m, self._burst, self._raw_burst = pictures, scans_m, burst, raw_burst
         self._scans = self._images = 0
 
-    def read(self, until_ns: int) -> Iterator[Received]:
+    def read(self, until_ns: int) -> Iterator[Received | RawPicture]:
         while (stamp_ns := self.start_ns + round(self._scans * SECOND_NS / RATES.scan_hz)) <= until_ns:
             self._scans += 1
             yield Received(stamp_ns, LidarScan(stamp_ns, self._scans_m[self._scans % len(self._scans_m)]))
@@ -50,11 +53,15 @@ class PreparedSource:
             yield self._image(stamp_ns)
         if self._burst and until_ns > self.start_ns + SECOND_NS:
             at_once = encode_jpeg(self._pictures[0])
-            yield from (Received(until_ns, CameraImage(until_ns + n, at_once)) for n in range(self._burst))
+            for n in range(self._burst):
+                if self._raw_burst:
+                    yield RawPicture(until_ns, until_ns + n, self._pictures[n % PICTURES])
+                else:
+                    yield Received(until_ns, CameraImage(until_ns + n, at_once))
             self._burst = 0
 
-    def _image(self, stamp_ns: int) -> Received:
-        return Received(stamp_ns, CameraImage(stamp_ns, encode_jpeg(self._pictures[self._images % PICTURES])))
+    def _image(self, stamp_ns: int) -> RawPicture:
+        return RawPicture(stamp_ns, stamp_ns, self._pictures[self._images % PICTURES])
 
     def close(self) -> None:
         """Nothing is held."""
@@ -89,10 +96,10 @@ def cpu_s() -> float:
 
 
 def record_prepared(
-    path: Path, prepared: tuple[np.ndarray, np.ndarray], seconds: float, burst: int = 0
+    path: Path, prepared: tuple[np.ndarray, np.ndarray], seconds: float, burst: int = 0, raw: bool = False
 ) -> dict[str, int]:
     clock, standing = HostClock(), Standing()
-    source = PreparedSource(clock, *prepared, burst)
+    source = PreparedSource(clock, *prepared, burst, raw)
     with RecordingWriter(path, source.info, "", start_ns=source.start_ns, realtime=True) as writer:
         summary = record(
             source, standing, standing, None, writer, (), RATES, MotionConfig(), seconds, realtime=True, clock=clock
@@ -116,9 +123,10 @@ def test_minutes_without_a_drop(
     assert sum(lost.values()) - lost["missed"] == 0
 
 
+@pytest.mark.parametrize("raw", [False, True], ids=["encoded", "raw"])
 @pytest.mark.parametrize("burst", BURST_IMAGES)
 def test_a_burst_of_pictures(
-    benchmark: BenchmarkFixture, tmp_path: Path, prepared: tuple[np.ndarray, np.ndarray], burst: int
+    benchmark: BenchmarkFixture, tmp_path: Path, prepared: tuple[np.ndarray, np.ndarray], burst: int, raw: bool
 ) -> None:
-    lost = benchmark.pedantic(record_prepared, (tmp_path / "r.mcap", prepared, 3.0, burst), rounds=1)
+    lost = benchmark.pedantic(record_prepared, (tmp_path / "r.mcap", prepared, 3.0, burst, raw), rounds=1)
     benchmark.extra_info |= {"burst": burst, **lost}

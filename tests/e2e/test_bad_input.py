@@ -1,35 +1,17 @@
 """Every wrong input: one line that says what, where and what to do; exit 2; nothing harmed."""
 
-import sys
-from collections.abc import Callable
 from pathlib import Path
 
 import pytest
+from refusals import Sdt, assert_refused
 
-from sdt_tools.cli.app import main
 from sdt_tools.models.card import ModelCard
 from sdt_tools.models.checkpoint import save_checkpoint
 from sdt_tools.models.follow_net import FollowNet, FollowNetConfig, new_follow_net
 from sdt_tools.models.preprocess import PreprocessConfig
 
 SAMPLES = Path(__file__).parents[2] / "recordings"
-Sdt = Callable[..., tuple[int, str]]
-
-
-@pytest.fixture
-def sdt(
-    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], tmp_path: Path
-) -> Callable[..., tuple[int, str]]:
-    """Runs a command in an empty folder; returns the exit code and what it said on stderr."""
-
-    def call(*words: object) -> tuple[int, str]:
-        monkeypatch.chdir(tmp_path)
-        monkeypatch.setattr(sys, "argv", ["sdt", *map(str, words)])
-        with pytest.raises(SystemExit) as stop:
-            main()
-        return int(stop.value.code or 0), capsys.readouterr().err
-
-    return call
+PLAIN = SAMPLES / "sample_plain.mcap"
 
 
 @pytest.fixture
@@ -41,15 +23,6 @@ def model(tmp_path: Path) -> Path:
         ModelCard(kind=FollowNet.kind, seed=0, architecture=network.architecture, preprocess=network.preprocess),
     )
     return tmp_path / "model"
-
-
-def assert_refused(result: tuple[int, str], *words: str) -> None:
-    code, said = result
-    assert code == 2
-    assert said.startswith("sdt: ")
-    assert said.count("\n") == 1
-    for word in words:
-        assert word in said
 
 
 @pytest.mark.parametrize(
@@ -79,6 +52,20 @@ def test_an_unknown_key_names_the_nearest(sdt: Sdt, tmp_path: Path) -> None:
     (tmp_path / "c.toml").write_text("[rates]\nscan_hertz = 25.0\n")
     result = sdt("record", "scene", "--config", "c.toml", "--out", "x.mcap")
     assert_refused(result, "c.toml", "unknown key", "rates.scan_hertz", "did you mean 'scan_hz'")
+
+
+def test_a_key_like_none_there_is_lists_them(sdt: Sdt, tmp_path: Path) -> None:
+    (tmp_path / "c.toml").write_text("[rates]\nwheels = 4\n")
+    code, said = sdt("record", "scene", "--config", "c.toml", "--out", "x.mcap")
+    assert_refused((code, said), "rates.wheels", "follow_hz, image_hz, scan_hz, vision_hz")
+    assert "did you mean" not in said
+
+
+@pytest.mark.parametrize("name", ["x.jpg", "x.weird", "x"])
+@pytest.mark.parametrize("verb", [["domains", "--level", "1", "--out"], ["inspect", PLAIN, "--plot"]])
+def test_pictures_are_png_and_nothing_else(sdt: Sdt, tmp_path: Path, verb: list[object], name: str) -> None:
+    assert_refused(sdt(*verb, name), f"{verb[-1]} {name}", ".png")
+    assert list(tmp_path.iterdir()) == []
 
 
 def test_an_output_that_exists_is_left_alone(sdt: Sdt, tmp_path: Path) -> None:
@@ -164,9 +151,10 @@ def test_a_scenario_that_cannot_be_is_refused(sdt: Sdt, tmp_path: Path, line: st
         (["--level", "3", "--domains", "own.toml"], ["level", "domains", "contradict"]),
         (["--level", "2", "--epsilon-m", "0.1"], ["level", "epsilon_m", "contradict"]),
         (["--arch", "transformer"], ["transformer", "plain or gate"]),
-        (["--inner", "guess"], ["safety.inner", "ibp", "pgd"]),
-        (["--level", "1", "--delta", "0"], ["safety.delta", "greater than 0"]),
-        (["--level", "1", "--lambda", "-1"], ["safety.weight", "greater than 0"]),
+        (["--inner", "guess"], ["--inner", "ibp", "pgd"]),
+        (["--level", "1", "--delta", "0"], ["--delta", "greater than 0"]),
+        (["--level", "1", "--lambda", "-1"], ["--lambda", "greater than 0"]),
+        (["--epochs", "0"], ["--epochs", "greater than or equal to 1"]),
     ],
 )
 def test_training_options_that_make_no_sense_are_named(sdt: Sdt, options: list[str], words: list[str]) -> None:

@@ -63,7 +63,7 @@ def test_the_summary_holds_what_is_promised_and_lies_beside_the_report(demo: tup
     recordings = list((out / "recordings").rglob("*.mcap"))
     assert summary["recordings"] == len(recordings) == 17
     assert summary["frames"] == sum(scans_in(path) for path in recordings)
-    assert summary["closed_loop"]["plain"]["runs"] == 2  # type: ignore[index]
+    assert summary["closed_loop"]["plain"]["runs"] == 2
     tags = summary["tags"]
     assert isinstance(tags, dict)
     assert set(tags) == {"systematic", "conditional", "transient", "isolated", "unexplained", "correct"}

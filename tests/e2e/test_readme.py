@@ -25,6 +25,8 @@ ROOT = Path(__file__).parents[2]
 README = (ROOT / "README.md").read_text(encoding="utf-8")
 SMALLER = {
     "--seconds 20": "--seconds 2",
+    "--from 5 --to 12.5": "--from 0.5 --to 1.5",
+    "--every 7": "--every 1",
     "seq 0 39": "seq 0 9",
     "--out analysis/practice\n": "--out analysis/practice --val-share 0.5\n",
     "--out analysis/my_follow": "--out analysis/my_follow --epochs 1",
@@ -56,7 +58,7 @@ def workplace(tmp_path: Path) -> Path:
 
 
 def test_the_commands_run_in_the_order_they_are_given(workplace: Path) -> None:
-    assert len(blocks()) == 6
+    assert len(blocks()) == 7
     script = "".join(blocks())
     for said, small in SMALLER.items():
         script = script.replace(said, small)

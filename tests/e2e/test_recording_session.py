@@ -21,8 +21,10 @@ from typer.testing import CliRunner
 
 from sdt_tools.cli.app import app
 from sdt_tools.errors import SdtError
+from sdt_tools.recording.inspect import inspect_recording
 from sdt_tools.recording.live.session_folder import ChangedConfigError
 from sdt_tools.recording.reader import Recording
+from sdt_tools.recording.repair import repair_recording
 
 SDT = [sys.executable, "-c", "from sdt_tools.cli.app import main; main()"]
 SHORT = ["record", "scene", "--scenario", "plain", "--seed", "7", "--no-camera"]
@@ -123,7 +125,7 @@ def test_takes_under_single_keys(tmp_path: Path, at_terminal: Callable[..., Term
     assert messages_in(folder / "take_001.mcap") == first["messages"]
     assert messages_in(folder / str(second["trash"]) / "take_002.mcap") == second["messages"]
     with Recording.open(folder / "take_001.mcap") as recording:
-        assert "mark 1" in [m.message.text for m in recording.messages(["/session/log"])]  # type: ignore[union-attr]
+        assert "mark 1" in [m.message.text for m in recording.messages(["/session/log"])]
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
@@ -149,6 +151,31 @@ def test_a_terminal_that_hangs_up_leaves_a_whole_take(tmp_path: Path, at_termina
     (take,) = takes(folder)
     assert take["ending"] == "hangup"
     assert messages_in(folder / "take_001.mcap") == take["messages"]
+
+
+def test_a_pause_of_a_take_that_was_killed_is_no_gap(tmp_path: Path, at_terminal: Callable[..., Terminal]) -> None:
+    path = tmp_path / "s" / "take_001.mcap"
+    terminal = at_terminal(*SHORT, "--realtime", "--session", path.parent)
+    until(lambda: (terminal.look(), grows(path))[1], "no take")
+    terminal.press(" ")
+    until(lambda: b"paused" in terminal.look(), "not paused")
+    time.sleep(1.5)  # as long as the pause is to be
+    size = path.stat().st_size
+    terminal.press(" ")
+    until(lambda: (terminal.look(), path.stat().st_size > size + 50_000)[1], "it does not go on")
+    terminal.process.kill()
+    terminal.process.wait()
+    cut = inspect_recording(path)
+    with Recording.open(path) as recording:
+        assert recording.truncated
+        ((start_ns, end_ns),) = recording.pauses
+    assert end_ns - start_ns > 1_400_000_000
+    assert cut.timing.topics["/lidar/scan"].max_gap_ns < 1_000_000_000
+    repair_recording(path, tmp_path / "new.mcap")
+    repaired = inspect_recording(tmp_path / "new.mcap")
+    assert not repaired.counted
+    assert repaired.timing == cut.timing
+    assert repaired.stats["pauses_ns"] == f"{start_ns}-{end_ns}"
 
 
 @pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGHUP])

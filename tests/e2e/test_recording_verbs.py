@@ -76,7 +76,7 @@ def test_a_constant_driver_drives(tmp_path: Path, monkeypatch: pytest.MonkeyPatc
     assert sdt(monkeypatch, *SHORT, "--seconds", 1, "--driver", "constant:backward", "--out", out) == 0
     with Recording.open(out) as recording:
         commands = [received.message for received in recording.messages(["/robot/command"])]
-    assert {(c.motion.label, c.driver) for c in commands} == {("backward", "constant:backward")}  # type: ignore[union-attr]
+    assert {(c.motion.label, c.driver) for c in commands} == {("backward", "constant:backward")}
 
 
 def test_a_network_drives(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

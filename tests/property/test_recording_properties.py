@@ -148,12 +148,11 @@ def test_ranges_are_found_where_protobuf_finds_them_and_nowhere_else(data: bytes
 @given(laser_scan_fields(), st.binary(max_size=9))
 def test_compiled_code_finds_the_same_ranges_or_leaves_them_to_protobuf(data: bytes, around: bytes) -> None:
     buffer = np.frombuffer(around + data + around, np.uint8)
-    start = np.array([len(around)])
-    offsets, lengths = find_ranges(buffer, start, start + len(data))
+    offset, length = find_ranges(buffer, len(around), len(around) + len(data))
     expected = by_protobuf(data)
-    if offsets[0] >= 0 and expected is not None:
-        assert buffer[offsets[0] : offsets[0] + lengths[0]].tobytes() == expected
-        assert len(around) <= offsets[0] + lengths[0] <= len(around) + len(data) or lengths[0] == 0
+    if offset >= 0 and expected is not None:
+        assert buffer[offset : offset + length].tobytes() == expected
+        assert len(around) <= offset + length <= len(around) + len(data) or length == 0
 
 
 received = st.builds(

@@ -13,6 +13,7 @@ from sdt_tools.error_analysis.distance import Epsilon
 from sdt_tools.error_analysis.explain import Explanation
 from sdt_tools.error_analysis.labelled import LabelledFrames
 from sdt_tools.error_analysis.tagging import tag_columns
+from sdt_tools.recording.incomplete import Incomplete
 from sdt_tools.statistics import wilson
 
 KEY_COLUMNS: Final = ("recording", "recording_id", "stamp_ns", "model", "label", "predicted")
@@ -46,7 +47,7 @@ class ErrorReport:
     """Counts, conditions and options of one analysis.
 
     ``rejected`` are conditions that were found but not confirmed. ``note`` says why nothing can be confirmed, where
-    that is so; ``warnings`` what to be careful with.
+    that is so; ``warnings`` what to be careful with; ``incomplete`` recordings were cut off or are damaged.
     """
 
     model: str
@@ -63,6 +64,7 @@ class ErrorReport:
     epsilon: Epsilon
     options: ErrorOptions
     warnings: tuple[str, ...]
+    incomplete: tuple[Incomplete, ...] = ()
 
     def document(self) -> dict[str, object]:
         """The report as JSON-ready values."""
@@ -85,10 +87,14 @@ class ErrorReport:
             "epsilon": _epsilon_document(self.epsilon),
             "options": self.options.model_dump(mode="json"),
             "warnings": list(self.warnings),
+            "truncated": any(recording.truncated for recording in self.incomplete),
+            "incomplete": [recording.document() for recording in self.incomplete],
         }
 
 
-def summarise(frames: LabelledFrames, explanation: Explanation, options: ErrorOptions) -> ErrorReport:
+def summarise(
+    frames: LabelledFrames, explanation: Explanation, options: ErrorOptions, incomplete: tuple[Incomplete, ...] = ()
+) -> ErrorReport:
     """Count what ``explanation`` says of ``frames``."""
     search, tagged = explanation.search, explanation.tagged
     total = len(frames.loss)
@@ -110,6 +116,7 @@ def summarise(frames: LabelledFrames, explanation: Explanation, options: ErrorOp
         epsilon=explanation.epsilon,
         options=options,
         warnings=tuple(_warnings(frames, explanation)),
+        incomplete=incomplete,
     )
 
 

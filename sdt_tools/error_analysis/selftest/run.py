@@ -155,7 +155,8 @@ def keep_predictions(
     Raises UsageError and RecordingError as an analysis of them does.
     """
     frames = load_labelled(predictions, options, model)
-    return keep(frames, read_situations(frames, find_recordings(frames, recordings), options, progress), folder)
+    scans, _ = read_situations(frames, find_recordings(frames, recordings), options, progress)
+    return keep(frames, scans, folder)
 
 
 def _units(

@@ -1,7 +1,6 @@
 """Attachments: files within the file, each with its own checksum."""
 
-import zlib
-
+from isal.isal_zlib import crc32
 from mcap.records import Attachment
 
 from sdt_tools.recording.container.records import UNREADABLE, body_of
@@ -18,4 +17,4 @@ def read_attachment(body: memoryview) -> Attachment | None:
         return None
     covered = stream.count - _CHECKSUM_BYTES
     crc = int.from_bytes(body[covered : stream.count], "little")
-    return attachment if not crc or zlib.crc32(body[:covered]) == crc else None
+    return attachment if not crc or crc32(body[:covered]) == crc else None

@@ -1,13 +1,13 @@
 """One stretch of messages in an MCAP file, unpacked and walked."""
 
 import struct
-import zlib
 from collections.abc import Iterator, Mapping, Set
 from dataclasses import dataclass
 from typing import Final, NamedTuple
 
 import lz4.frame
 import zstandard
+from isal.isal_zlib import crc32
 from mcap.opcode import Opcode
 
 MAX_CHUNK_BYTES: Final = 1 << 30
@@ -89,9 +89,14 @@ def read_segment(view: memoryview, segment: Segment) -> bytes | memoryview:
         return data
     if len(data) != size:
         raise DamagedChunkError(f"it holds {len(data)} bytes where {size} are promised")
-    if crc and zlib.crc32(data) != crc:
+    if crc and crc32(data) != crc:
         raise DamagedChunkError("its checksum does not match")
     return data
+
+
+def is_checked(view: memoryview, offset: int) -> bool:
+    """Whether the segment at ``offset`` is a chunk with a checksum, not a run of messages."""
+    return view[offset] != Opcode.MESSAGE and _CHUNK_HEAD.unpack_from(view, offset)[5] != 0
 
 
 def ends_within_a_record(view: memoryview, segment: Segment, data: bytes | memoryview) -> bool:
@@ -99,7 +104,7 @@ def ends_within_a_record(view: memoryview, segment: Segment, data: bytes | memor
 
     Only chunks without a checksum are looked through: what a checksum covers is as it was written.
     """
-    if segment.loose or segment.cut or _CHUNK_HEAD.unpack_from(view, segment.offset)[5]:
+    if segment.loose or segment.cut or is_checked(view, segment.offset):
         return False
     at, size = 0, len(data)
     while at + _RECORD_HEAD.size <= size:

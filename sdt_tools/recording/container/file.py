@@ -8,15 +8,15 @@ already; both are finished together, so that whoever reads scans alone never tou
 
 import os
 import struct
-import zlib
 from collections import Counter
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from io import FileIO
 from pathlib import Path
 from typing import Final
 
 import lz4.frame
+from isal.isal_zlib import crc32
 from mcap.data_stream import RecordBuilder
 from mcap.opcode import Opcode
 from mcap.records import (
@@ -48,6 +48,8 @@ _INDEX_HEAD: Final = struct.Struct("<BQHI")
 _CHUNK_HEAD: Final = struct.Struct("<BQQQQII")
 _FOOTER_CHECKED: Final = struct.Struct("<BQQQ")
 
+_PARTS: Final = 1024
+"""So many the system takes at once (IOV_MAX, at least 1024 wherever there are terminals)."""
 _INDEX_RECORD_BYTES: Final = 256
 """No record of the summary but a schema is longer, names as we give them."""
 
@@ -86,7 +88,7 @@ class McapFile:
     such a refusal the file is cut back to its last whole record; ``drop_last_chunk`` makes room for the file's end.
     """
 
-    def __init__(self, path: Path, library: str, chunk_bytes: int = CHUNK_BYTES) -> None:
+    def __init__(self, path: Path, library: str, chunk_bytes: int = CHUNK_BYTES, profile: str = "") -> None:
         self.path = path
         self._chunk_bytes = chunk_bytes
         self._schemas: dict[tuple[str, str, bytes], Schema] = {}
@@ -100,7 +102,7 @@ class McapFile:
         self._counts: Counter[int] = Counter()
         self._size = 0
         self._file = _create(path)
-        self._write(MAGIC + _record(Header("", library)))
+        self._write(MAGIC + _record(Header(profile, library)))
 
     @property
     def size(self) -> int:
@@ -169,11 +171,14 @@ class McapFile:
         record = _record(Metadata(name, dict(entries)))
         self._metadata.append(MetadataIndex(self._write(record), len(record), name))
 
-    def add_attachment(self, name: str, media_type: str, data: bytes, stamp_ns: int) -> None:
-        """Write a file into the file."""
-        record = _record(Attachment(stamp_ns, stamp_ns, name, media_type, data))
+    def add_attachment(
+        self, name: str, media_type: str, data: bytes, log_ns: int, created_ns: int | None = None
+    ) -> None:
+        """Write a file into the file, made when it is logged unless another time is given."""
+        made_ns = log_ns if created_ns is None else created_ns
+        record = _record(Attachment(create_time=made_ns, log_time=log_ns, name=name, media_type=media_type, data=data))
         offset = self._write(record)
-        self._attachments.append(AttachmentIndex(offset, len(record), stamp_ns, stamp_ns, len(data), name, media_type))
+        self._attachments.append(AttachmentIndex(offset, len(record), made_ns, log_ns, len(data), name, media_type))
 
     def finish_chunks(self) -> None:
         """Hand what is pending to the operating system: from here on it survives the end of this process."""
@@ -218,20 +223,23 @@ class McapFile:
         self._file.close()
 
     def _write_chunk(self, chunk: _OpenChunk) -> None:
-        plain = b"".join(chunk.parts)
-        compression, data = ("lz4", lz4.frame.compress(plain)) if chunk.compressed else ("", plain)
-        name = compression.encode()
-        length = _CHUNK_HEAD.size - 9 + len(name) + 8 + len(data)
-        checksum = zlib.crc32(plain)
-        head = _CHUNK_HEAD.pack(Opcode.CHUNK, length, chunk.start_ns, chunk.end_ns, len(plain), checksum, len(name))
-        head += name + struct.pack("<Q", len(data))
-        chunk_length = len(head) + len(data)
+        compression, parts = "", chunk.parts
+        if chunk.compressed:
+            compression, parts = "lz4", [lz4.frame.compress(b"".join(parts), block_linked=False)]  # smaller, sooner
+        checksum = 0
+        for part in chunk.parts:
+            checksum = crc32(part, checksum)
+        data_length, name = sum(map(len, parts)), compression.encode()
+        length = _CHUNK_HEAD.size - 9 + len(name) + 8 + data_length
+        head = _CHUNK_HEAD.pack(Opcode.CHUNK, length, chunk.start_ns, chunk.end_ns, chunk.size, checksum, len(name))
+        head += name + struct.pack("<Q", data_length)
+        chunk_length = len(head) + data_length
         offset = self._size
         indexes, index_offsets = b"", {}
         for channel_id, entries in chunk.indexes.items():
             index_offsets[channel_id] = offset + chunk_length + len(indexes)
             indexes += _INDEX_HEAD.pack(Opcode.MESSAGE_INDEX, 6 + len(entries), channel_id, len(entries)) + entries
-        self._write(head, data, indexes)
+        self._write(head, *parts, indexes)
         self._chunk_indexes.append(
             ChunkIndex(
                 message_start_time=chunk.start_ns,
@@ -241,8 +249,8 @@ class McapFile:
                 message_index_offsets=index_offsets,
                 message_index_length=len(indexes),
                 compression=compression,
-                compressed_size=len(data),
-                uncompressed_size=len(plain),
+                compressed_size=data_length,
+                uncompressed_size=chunk.size,
             )
         )
         counts = {channel_id: len(entries) // _INDEX_ENTRY.size for channel_id, entries in chunk.indexes.items()}
@@ -260,7 +268,7 @@ class McapFile:
                 summary += records
         offsets_start = summary_start + len(summary)
         checked = summary + offsets + _FOOTER_CHECKED.pack(Opcode.FOOTER, 20, summary_start, offsets_start)
-        footer = _record(Footer(summary_start, offsets_start, zlib.crc32(checked)))
+        footer = _record(Footer(summary_start, offsets_start, crc32(checked)))
         return data_end + summary + offsets + footer + MAGIC
 
     def _summary_groups(self) -> list[list[McapRecord]]:
@@ -289,16 +297,21 @@ class McapFile:
         """Write all of ``parts`` or nothing; the offset they begin at."""
         offset = self._size
         try:
-            for part in parts:
-                left = memoryview(part)
-                while left:
-                    left = left[self._file.write(left) :]
+            for first in range(0, len(parts), _PARTS):
+                self._write_out(parts[first : first + _PARTS])
         except OSError as error:
             os.ftruncate(self._file.fileno(), offset)
             self._file.seek(offset)
             raise self._refused(error) from None
         self._size += sum(map(len, parts))
         return offset
+
+    def _write_out(self, parts: Sequence[bytes]) -> None:
+        written = os.writev(self._file.fileno(), parts)
+        if written < sum(map(len, parts)):  # a nearly full disk takes a part; the rest is refused, or goes on its own
+            rest = memoryview(b"".join(parts))[written:]
+            while rest:
+                rest = rest[self._file.write(rest) :]
 
     def _refused(self, error: OSError) -> DiskRefusedError:
         return DiskRefusedError(

@@ -32,6 +32,11 @@ def chunk_fits(view: memoryview, body: int, length: int) -> bool:
     return used == length or (used is not None and _record_follows(view, body + length))
 
 
+def chunk_reaches_beyond(view: memoryview, body: int, length: int) -> bool:
+    """Whether a chunk is whole but for its end, which the file lacks: all its lengths agree."""
+    return body + length > len(view) and _chunk_used(view, body, length) == length
+
+
 def adds_up(view: memoryview, opcode: int, body: int, length: int) -> bool:
     """Whether the fields of a record take exactly the room that it has; False for kinds that do not tell."""
     if opcode == Opcode.CHUNK:
@@ -53,7 +58,7 @@ def adds_up(view: memoryview, opcode: int, body: int, length: int) -> bool:
 
 def _chunk_used(view: memoryview, body: int, length: int) -> int | None:
     """The room that a chunk's fields take; None where they do not agree."""
-    if length < _CHUNK_FIXED:
+    if length < _CHUNK_FIXED or body + _CHUNK_FIXED > len(view):
         return None
     start_ns, end_ns, size, _, name_length = _CHUNK_HEAD.unpack_from(view, body)
     if start_ns > end_ns or _CHUNK_FIXED + name_length > length:

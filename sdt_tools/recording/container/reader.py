@@ -1,7 +1,8 @@
 """An MCAP file of anyone's, read: streaming, memory-mapped, a chunk at a time.
 
 Whole files are read by their summary, files that were cut off as far as they go (``truncated``). A chunk that is
-damaged costs itself: what it held is missing, the rest is read, and ``damage`` names the interval.
+damaged costs itself: what it held is missing, the rest is read, and ``damage`` names the interval. So does a message
+that is damaged, where whoever knows what it means says so (``lose``).
 """
 
 import contextlib
@@ -15,7 +16,7 @@ from pathlib import Path
 from types import TracebackType
 from typing import NamedTuple
 
-from mcap.records import Attachment, Channel, Metadata, Schema
+from mcap.records import Attachment, Channel, Header, Metadata, Schema
 
 from sdt_tools.errors import RecordingError
 from sdt_tools.recording.container.attachments import read_attachment
@@ -24,6 +25,7 @@ from sdt_tools.recording.container.chunk import (
     RawMessage,
     Segment,
     ends_within_a_record,
+    is_checked,
     read_segment,
     walk_messages,
 )
@@ -42,6 +44,13 @@ class Damage:
     start_ns: int
     end_ns: int
     reason: str
+
+    @property
+    def text(self) -> str:
+        """The same for people; what costs no message has no interval."""
+        if not self.end_ns:
+            return self.reason
+        return f"lost from {self.start_ns} to {self.end_ns} ns: {self.reason}"
 
 
 class RawEntry(NamedTuple):
@@ -72,6 +81,7 @@ class McapReader:
         self._map = _map_file(path)
         self._view = memoryview(self._map)
         self._damage: dict[tuple[int, str], Damage] = {}
+        self._lost: dict[tuple[int, str], dict[int, int]] = {}
         self._index: FileIndex = read_index(self._view)
 
     def close(self) -> None:
@@ -99,6 +109,11 @@ class McapReader:
         return self._view[: 1 << 20]
 
     @property
+    def header(self) -> Header:
+        """The profile that the file keeps to and the library that wrote it; empty where it does not say."""
+        return self._index.header
+
+    @property
     def truncated(self) -> bool:
         """Whether the file ends before its footer: a recording that was cut off, or is still being written."""
         return self._index.truncated
@@ -110,6 +125,8 @@ class McapReader:
         if bytes(self._view[: len(MAGIC)]) != MAGIC:
             skipped.append(_harmless("the file's first bytes are not those of an MCAP"))
         skipped += map(_harmless, self._index.harmless)
+        for (_, reason), lost in self._lost.items():
+            skipped.append(Damage(min(lost.values()), max(lost.values()), f"{len(lost)} {reason}"))
         return tuple(sorted([*skipped, *self._damage.values()], key=lambda damage: damage.start_ns))
 
     @property
@@ -207,6 +224,20 @@ class McapReader:
             reason = "a record in it is longer than it is; what follows that record is lost"
             self._note(segment.offset, reason, segment.start_ns, segment.end_ns)
         return data
+
+    def is_checked(self, offset: int) -> bool:
+        """Whether a checksum vouches for what is read of the segment at ``offset``."""
+        return is_checked(self._view, offset)
+
+    def lose(self, offset: int, place: int, log_ns: int, reason: str) -> None:
+        """Name in ``damage`` a message that was found and is not what it should be; it counts once, however often read.
+
+        It begins at ``place`` in the segment at ``offset``; ``reason`` says in the plural what such messages are.
+        """
+        lost = self._lost.setdefault((offset, reason), {})
+        if not lost:
+            _log.warning("%s: damaged at byte %d: %s; the first at %d ns", self.path, offset, reason, log_ns)
+        lost[place] = log_ns
 
     def _entries(
         self, segment: Segment, wanted: frozenset[int], start_ns: int | None, end_ns: int | None

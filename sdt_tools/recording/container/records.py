@@ -9,7 +9,7 @@ from typing import Final
 from mcap.data_stream import ReadDataStream
 from mcap.exceptions import McapError
 from mcap.opcode import Opcode
-from mcap.records import Channel, Metadata, Schema
+from mcap.records import Channel, Header, Metadata, Schema
 
 from sdt_tools.recording.container.chunk import Segment
 
@@ -31,6 +31,7 @@ class Gap:
 class FileIndex:
     """What a file holds and where. ``counts`` (messages by channel) is None where only counting would tell."""
 
+    header: Header = field(default_factory=lambda: Header(profile="", library=""))
     segments: list[Segment] = field(default_factory=list)
     channels: dict[int, Channel] = field(default_factory=dict)
     schemas: dict[int, Schema] = field(default_factory=dict)
@@ -59,12 +60,14 @@ def body_of(view: memoryview, offset: int, length: int) -> ReadDataStream:
 
 
 def take_record(view: memoryview, index: FileIndex, opcode: int, body: int, length: int) -> None:
-    """Take a schema, channel, metadata or attachment into ``index``; of two with one number the first counts.
+    """Take a header, schema, channel, metadata or attachment into ``index``; of two with one number the first counts.
 
     A record that is damaged costs itself.
     """
     try:
-        if opcode == Opcode.SCHEMA:
+        if opcode == Opcode.HEADER:
+            index.header = Header.read(body_of(view, body, length))
+        elif opcode == Opcode.SCHEMA:
             schema = Schema.read(body_of(view, body, length))
             if schema.id:  # zero says that there is none, and readers must not take it
                 index.schemas.setdefault(schema.id, schema)

@@ -5,10 +5,10 @@ the records between the chunks are walked as well, which is quick, for it leaps 
 """
 
 import struct
-import zlib
 from collections.abc import Sequence
 from typing import Final
 
+from isal.isal_zlib import crc32
 from mcap.opcode import Opcode
 from mcap.records import ChunkIndex, Statistics
 
@@ -38,7 +38,7 @@ def read_summary(view: memoryview) -> FileIndex | None:
         return None
     if not len(MAGIC) <= summary_start <= footer_at:
         raise DamagedSummaryError("its footer does not lead to its summary")
-    if crc and zlib.crc32(view[summary_start : footer_at + _FOOTER.size - 4]) != crc:
+    if crc and crc32(view[summary_start : footer_at + _FOOTER.size - 4]) != crc:
         raise DamagedSummaryError("the checksum of its summary does not match")
     try:
         return _read(view, summary_start, footer_at, checked=crc != 0)

@@ -15,7 +15,7 @@ from mcap.opcode import Opcode
 
 from sdt_tools.recording.container.chunk import DamagedChunkError, Segment, read_segment, walk_messages
 from sdt_tools.recording.container.file import MAGIC
-from sdt_tools.recording.container.lengths import adds_up, chunk_fits
+from sdt_tools.recording.container.lengths import adds_up, chunk_fits, chunk_reaches_beyond
 from sdt_tools.recording.container.records import HEAD, FileIndex, Gap, records, take_record
 
 _TIMES: Final = struct.Struct("<QQ")
@@ -56,6 +56,9 @@ class _Walk:
             opcode, length = HEAD.unpack_from(view, at)
             body, end = at + HEAD.size, at + HEAD.size + length
             if not self._is_record(opcode, body, length):
+                if opcode == Opcode.CHUNK and chunk_reaches_beyond(view, body, length):
+                    self._cut(opcode, body)
+                    break  # it is not searched for records: it is full of them
                 found = self._next_record(at if self._is_vouched(before, at) else before + 1)
                 if found is None:
                     self._cut(opcode, body)

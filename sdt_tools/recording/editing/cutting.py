@@ -4,7 +4,8 @@ from pathlib import Path
 
 from sdt_tools.recording.container.reader import McapReader
 from sdt_tools.recording.copying import RecordCopy, new_file
-from sdt_tools.recording.editing.latched import Carried, LastKnown, carried_in
+from sdt_tools.recording.editing.latched import Carried, LastKnown, carried_in, latched_topics
+from sdt_tools.recording.editing.pauses import pauses_between, recorded
 from sdt_tools.recording.editing.plan import Cut, Part
 from sdt_tools.recording.editing.provenance import EditedRecording, original, write_beginning, write_end
 from sdt_tools.recording.reader import recording_id_of
@@ -26,7 +27,7 @@ class Cutter:
         """Write ``part`` at ``path``; all messages as they are, before them what holds from before."""
         source, cut = self._source, self._cut
         recording_id = _part_id(recording_id_of(source), cut, part)
-        with new_file(path) as file:
+        with new_file(path, profile=source.header.profile) as file:
             write_beginning(file, [source], recording_id)
             copy = RecordCopy(file)
             for number in self._kept:
@@ -37,7 +38,7 @@ class Cutter:
                     self._known, self._passed_ns = LastKnown(source), part.spans[place - 1].end_ns
                 self._known.pass_over(self._passed_ns, span.start_ns)
                 self._passed_ns = span.start_ns
-                carried |= self._known.write(copy, span.start_ns)
+                carried |= self._known.write(copy, span.start_ns, self._kept)
                 carried |= {c for c in self._was_carried if span.touches(c.at_ns, c.at_ns)}
                 for entry in source.entries(self._kept, span.start_ns, span.end_ns):
                     copy.take(source, entry)
@@ -51,8 +52,9 @@ class Cutter:
                 dropped_topics=cut.dropped_topics,
                 messages=file.counts,
                 carried=carried,
+                latched_topics=latched_topics(source),
             )
-            write_end(file, edited)
+            write_end(file, edited, copy.stats(pauses_between(recorded(source, part.spans))))
         return edited
 
 

@@ -1,17 +1,16 @@
 """Planned edits, carried out: all of their new recordings, or none."""
 
-import shutil
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
-from sdt_tools.errors import OutputExistsError, RecordingError
 from sdt_tools.recording.container.reader import McapReader
 from sdt_tools.recording.editing.cutting import Cutter
 from sdt_tools.recording.editing.merging import write_merged
 from sdt_tools.recording.editing.plan import Cut, Merge
 from sdt_tools.recording.editing.provenance import EditedRecording
+from sdt_tools.recording.scratch import give_name, scratch_folder
 
 
 @dataclass(frozen=True)
@@ -38,15 +37,10 @@ def edit_under_way(plan: Cut | Merge) -> Iterator[tuple[Finished, ...]]:
 
     Raises as ``edit_recordings``.
     """
-    first = plan.outs[0]
-    scratch = first.with_name(f".{first.name}.edit")
-    shutil.rmtree(scratch, ignore_errors=True)  # of an edit that was interrupted
-    try:
+    with scratch_folder(plan.outs[0], plan.out_option) as scratch:
         finished = _written(plan, scratch)
         yield finished
         _put_in_place(finished)
-    finally:
-        shutil.rmtree(scratch, ignore_errors=True)
 
 
 def _written(plan: Cut | Merge, scratch: Path) -> tuple[Finished, ...]:
@@ -60,11 +54,13 @@ def _written(plan: Cut | Merge, scratch: Path) -> tuple[Finished, ...]:
 
 
 def _put_in_place(finished: tuple[Finished, ...]) -> None:
-    for new in finished:
-        if new.edited.out.exists():
-            raise OutputExistsError(new.edited.out)
-    for new in finished:
-        try:
-            new.path.rename(new.edited.out)
-        except OSError as error:
-            raise RecordingError(f"{new.edited.out}: cannot be put in its place: {error.strerror}") from None
+    """All of them, or none."""
+    placed: list[Path] = []
+    try:
+        for new in finished:
+            give_name(new.path, new.edited.out)
+            placed.append(new.edited.out)
+    except BaseException:
+        for path in placed:
+            path.unlink(missing_ok=True)
+        raise

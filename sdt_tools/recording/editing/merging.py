@@ -10,7 +10,8 @@ from zlib import crc32
 
 from sdt_tools.recording.container.reader import McapReader, RawEntry
 from sdt_tools.recording.copying import RecordCopy, new_file
-from sdt_tools.recording.editing.latched import Carried, carried_in, place_of
+from sdt_tools.recording.editing.latched import Carried, carried_in, latched_topics, place_of
+from sdt_tools.recording.editing.pauses import pauses_between, recorded, spans_of
 from sdt_tools.recording.editing.plan import Merge
 from sdt_tools.recording.editing.provenance import EditedRecording, original, write_beginning, write_end
 from sdt_tools.recording.editing.span import Span, whole_span
@@ -34,7 +35,7 @@ def write_merged(plan: Merge, path: Path) -> EditedRecording:
         wholes = [whole_span(source) for source in sources]
         carried = [carried_in(source) for source in sources]
         needless = _needless(sources, carried)
-        with new_file(path) as file:
+        with new_file(path, profile=_profile(sources)) as file:
             write_beginning(file, sources, recording_id)
             copy = RecordCopy(file)
             for source in sources:
@@ -58,11 +59,19 @@ def write_merged(plan: Merge, path: Path) -> EditedRecording:
                 dropped_topics=(),
                 messages=file.counts,
                 carried=frozenset().union(*(own - gone for own, gone in zip(carried, needless, strict=True))),
+                latched_topics=frozenset().union(*map(latched_topics, sources)),
                 shared=shared,
                 interleaved=_overlaps(wholes),
             )
-            write_end(file, edited)
+            pauses = pauses_between(span for source in sources for span in recorded(source, spans_of(source)))
+            write_end(file, edited, copy.stats(pauses))
     return edited
+
+
+def _profile(sources: Sequence[McapReader]) -> str:
+    """The profile that all keep to; none where they differ."""
+    profiles = {source.header.profile for source in sources}
+    return profiles.pop() if len(profiles) == 1 else ""
 
 
 def _numbered(place: int, source: McapReader, needless: frozenset[Carried]) -> Iterator[_Numbered]:

@@ -3,6 +3,7 @@
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
+from math import isfinite
 from pathlib import Path
 from typing import Final, TypeVar
 
@@ -33,6 +34,11 @@ class Cut:
     dropped_topics: tuple[str, ...] = ()
 
     @property
+    def out_option(self) -> str:
+        """The option that says where they are made."""
+        return "--out-dir" if self.action == "split" else "--out"
+
+    @property
     def originals(self) -> tuple[Path, ...]:
         """The one recording."""
         return (self.original,)
@@ -49,6 +55,7 @@ class Merge:
 
     originals: tuple[Path, ...]
     out: Path
+    out_option: str = "--out"
 
     @property
     def outs(self) -> tuple[Path, ...]:
@@ -98,11 +105,11 @@ def plan_split_every(path: Path, seconds: float, out_dir: Path) -> Cut:
 
     Raises UsageError for no time at all, or for more than 9,999 parts; else as ``plan_trim``.
     """
+    if not (isfinite(seconds) and seconds * SECOND_NS >= 1):
+        raise UsageError(f"--every {seconds:g}: no time that a part can last; give seconds, as in 10 or 0.5")
     every_ns = round(seconds * SECOND_NS)
     with McapReader(path) as source:
         whole = whole_span(source)
-        if every_ns <= 0:
-            raise UsageError(f"--every {seconds:g}: a part has to last some time")
         if (whole.end_ns - whole.start_ns) // every_ns >= MOST_PARTS:
             raise UsageError(f"{path}: --every {seconds:g} makes more than {MOST_PARTS} parts; choose longer ones")
         return _split(source, [*range(whole.start_ns, whole.end_ns, every_ns), whole.end_ns], out_dir)
@@ -176,5 +183,5 @@ def _entries(source: McapReader, spans: Iterable[Span], dropped_topics: Sequence
 def _free(plan: Plan) -> Plan:
     for out in plan.outs:
         if out.exists():
-            raise OutputExistsError(out)
+            raise OutputExistsError(out, plan.out_option)
     return plan

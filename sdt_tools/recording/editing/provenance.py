@@ -8,7 +8,7 @@ from pathlib import Path
 
 from sdt_tools.recording.container.file import McapFile
 from sdt_tools.recording.container.reader import Damage, McapReader
-from sdt_tools.recording.editing.latched import CARRIED, EDIT, Carried, carried_text
+from sdt_tools.recording.editing.latched import CARRIED, EDIT, LATCHED, Carried, carried_text
 from sdt_tools.recording.editing.span import Span, seconds_of
 from sdt_tools.recording.reader import recording_id_of
 from sdt_tools.recording.session import SESSION, SOFTWARE, STATS
@@ -28,7 +28,8 @@ class Original:
 class EditedRecording:
     """A new recording. ``spans`` of its originals are in it; ``messages`` by topic, the ``carried`` among them.
 
-    ``shared`` messages stand in several originals and here once; in ``interleaved`` intervals originals overlap.
+    ``latched_topics`` are those of others whose messages hold on. ``shared`` messages stand in several originals and
+    here once; in ``interleaved`` intervals originals overlap.
     """
 
     out: Path
@@ -39,6 +40,7 @@ class EditedRecording:
     dropped_topics: tuple[str, ...]
     messages: Mapping[str, int]
     carried: frozenset[Carried]
+    latched_topics: frozenset[str] = frozenset()
     shared: int = 0
     interleaved: tuple[Span, ...] = ()
 
@@ -83,13 +85,12 @@ def write_beginning(file: McapFile, sources: Sequence[McapReader], recording_id:
                 written.append(entries)
 
 
-def write_end(file: McapFile, edited: EditedRecording) -> None:
-    """``sdt.stats`` with what is true of the new recording, and ``sdt.edit``.
+def write_end(file: McapFile, edited: EditedRecording, stats: Mapping[str, str]) -> None:
+    """``sdt.stats`` with what is true of the new recording, ``stats`` that were counted in it, and ``sdt.edit``.
 
     What the originals' stats say of drops, gaps or decisions is about the whole of each: it is not taken over.
     """
-    counts = {f"count.{topic}": str(count) for topic, count in edited.messages.items()}
-    file.add_metadata(STATS, counts | {"seconds": f"{edited.seconds:.3f}"})
+    file.add_metadata(STATS, {**stats, "seconds": f"{edited.seconds:.3f}"})
     originals = [
         {
             "name": original.path.name,
@@ -108,6 +109,7 @@ def write_end(file: McapFile, edited: EditedRecording) -> None:
             "dropped_topics": json.dumps(edited.dropped_topics),
             "shared": str(edited.shared),
             CARRIED: carried_text(edited.carried),
+            LATCHED: json.dumps(sorted(edited.latched_topics)),
         },
     )
 
@@ -134,6 +136,6 @@ def _write_attachments(file: McapFile, sources: Sequence[McapReader]) -> None:
             what = (attached.name, hashlib.sha256(attached.data).digest())
             if what not in written:
                 name = f"{source.path.stem}.{attached.name}" if attached.name in names else attached.name
-                file.add_attachment(name, attached.media_type, attached.data, attached.log_time)
+                file.add_attachment(name, attached.media_type, attached.data, attached.log_time, attached.create_time)
                 written.add(what)
         names |= {name for name, _ in written}

@@ -5,7 +5,9 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Final
 
+from sdt_tools.recording.reader import Recording
 from sdt_tools.recording.session import SESSION, STATS
+from sdt_tools.recording.timing.pauses import PAUSES, pauses_text
 
 CONFIG: Final = "sdt.config"
 
@@ -25,6 +27,13 @@ class About:
             STATS: json.dumps(dict(self.stats)),
             CONFIG: self.config_toml,
         }
+
+
+def about_of(recording: Recording) -> About:
+    """What ``recording`` says; where a cut has taken its stats, the pauses that its log tells of are in their place."""
+    pauses = recording.pauses
+    stats = recording.stats or ({PAUSES: pauses_text(pauses)} if pauses else {})
+    return About(recording.session, stats, recording.config_toml)
 
 
 def about_from(texts: Mapping[str, str]) -> About | None:

@@ -5,8 +5,6 @@ pose, the distortion of a lens) arrives as it left, to the bit.
 """
 
 from collections.abc import Iterator, Mapping
-from pathlib import Path
-from types import TracebackType
 from typing import Any, NamedTuple
 
 from google.protobuf.message import DecodeError
@@ -14,12 +12,14 @@ from google.protobuf.message import DecodeError
 from sdt_tools.clock import SECOND_NS
 from sdt_tools.errors import RecordingError
 from sdt_tools.recording.container.file import McapFile
-from sdt_tools.recording.container.reader import Damage, McapReader
 from sdt_tools.recording.exchange.about import About
 from sdt_tools.recording.messages.schemas import message_class, schema_data
-from sdt_tools.recording.messages.topics import CAMERA_IMAGE, TOPIC_BY_NAME, Topic, is_ours
+from sdt_tools.recording.messages.topics import CAMERA_IMAGE, Topic
 from sdt_tools.recording.reader import Recording
 from sdt_tools.recording.session import CONFIG_MEDIA_TYPE, CONFIG_NAME, SESSION, STATS
+from sdt_tools.recording.timing.pauses import pauses_of
+from sdt_tools.recording.timing.stamps import StampLog
+from sdt_tools.recording.timing.summary import ENTRY, timing_entries, timing_of
 
 
 class Carried(NamedTuple):
@@ -31,67 +31,22 @@ class Carried(NamedTuple):
     message: Any
 
 
-class Outgoing:
-    """A recording to be carried elsewhere; use it in a ``with`` statement.
+def outgoing(recording: Recording) -> Iterator[Carried]:
+    """All messages of ``recording`` in order of receipt; one that does not parse stays behind, named in ``damage``.
 
-    Raises RecordingError for a path that is no recording.
+    Raises RecordingError where there are none.
     """
-
-    def __init__(self, path: Path) -> None:
-        self.path = path
-        with Recording.open(path) as recording:
-            self.about = About(recording.session, recording.stats, recording.config_toml)
-            self.topics = {name: topic.count for name, topic in recording.topics.items() if topic.count}
-            """Messages by topic, as the summary has them."""
-        self._file = McapReader(path)
-
-    def __enter__(self) -> "Outgoing":
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None
-    ) -> None:
-        self._file.close()
-
-    @property
-    def truncated(self) -> bool:
-        """Whether the recording was cut off."""
-        return self._file.truncated
-
-    @property
-    def damage(self) -> tuple[Damage, ...]:
-        """Stretches met so far that could not be read."""
-        return self._file.damage
-
-    @property
-    def left_out(self) -> dict[str, int]:
-        """Messages of topics that are not ours and stay behind."""
-        counts: dict[str, int] = {}
-        for number, channel in self._file.channels.items():
-            if number not in self._ours():
-                counts[channel.topic] = counts.get(channel.topic, 0) + self._file.extents[number].count
-        return counts
-
-    def messages(self) -> Iterator[Carried]:
-        """All messages of our topics in order of receipt; RecordingError for one that does not parse."""
-        ours = self._ours()
-        for entry in self._file.entries(frozenset(ours)):
-            topic = ours[entry.channel_id]
-            try:
-                message = message_class(topic.schema).FromString(entry.data)
-            except DecodeError:
-                raise RecordingError(
-                    f"{self.path}: {topic.name} at {entry.publish_ns} ns: not a valid {topic.schema}; "
-                    "the data is damaged, `sdt repair` saves the rest"
-                ) from None
-            yield Carried(topic, entry.log_ns, entry.publish_ns, message)
-
-    def _ours(self) -> Mapping[int, Topic]:
-        return {
-            number: TOPIC_BY_NAME[channel.topic]
-            for number, channel in self._file.channels.items()
-            if is_ours(channel.topic, self._file.schema_name(channel), channel.message_encoding)
-        }
+    empty = True
+    for topic, entry in recording.entries():
+        try:
+            message = message_class(topic.schema).FromString(entry.data)
+        except DecodeError:
+            recording.lose(topic, entry)
+            continue
+        empty = False
+        yield Carried(topic, entry.log_ns, entry.publish_ns, message)
+    if empty:
+        raise RecordingError(f"{recording.path}: holds no messages; there is nothing to export")
 
 
 class Incoming:
@@ -101,6 +56,7 @@ class Incoming:
         self._file = file
         self._about = about
         self._channels: dict[str, int] = {}
+        self._stamps = StampLog()
         file.add_metadata(SESSION, about.session)
 
     def take(self, carried: Carried) -> None:
@@ -117,12 +73,14 @@ class Incoming:
         data = message.SerializeToString(deterministic=True)
         compress = topic.name != CAMERA_IMAGE  # JPEG does not compress
         self._file.add_message(number, received_ns, stamp_ns, data, compress)
+        self._stamps.see(topic.name, received_ns, stamp_ns)
 
     def close(self, stats: Mapping[str, str]) -> dict[str, int]:
-        """Write ``sdt.stats``: the original's with ``stats`` added and counts put right. The counts by topic."""
+        """Write ``sdt.stats``: the original's and ``stats``, with counts and timing put right. The counts by topic."""
         self._file.finish_chunks()
         counts = self._file.counts
-        kept = {name: value for name, value in self._about.stats.items() if not name.startswith("count.")}
+        kept = {name: value for name, value in self._about.stats.items() if not name.startswith(("count.", ENTRY))}
         counted = {f"count.{topic}": str(count) for topic, count in counts.items()}
-        self._file.add_metadata(STATS, {**counted, **kept, **stats})
+        timing = timing_entries(timing_of(self._stamps, pauses_of(kept)))
+        self._file.add_metadata(STATS, {**counted, **timing, **kept, **stats})
         return counts

@@ -21,6 +21,7 @@ from sdt_tools.clock import FAST_EPOCH_NS, SECOND_NS
 from sdt_tools.errors import OutputExistsError, RecordingError, UsageError
 from sdt_tools.frames import RAYS, LidarScan, LogEntry, LogLevel, Received
 from sdt_tools.protocols import SourceInfo
+from sdt_tools.recording.scratch import give_name, scratch_folder
 from sdt_tools.recording.writer import RecordingWriter
 
 COLUMNS: Final = RAYS + 4
@@ -52,11 +53,10 @@ def import_lidar_csv(path: Path, out: Path, hz: float) -> ImportSummary:
         raise OutputExistsError(out)
     notes = {"import_file": path.name, "import_sha256": _sha256(path), "import_hz": f"{hz:g}"}
     info = SourceInfo("import", devices={"lidar": "SICK LMS1xx", "base": "Pioneer P3-AT"})
-    scratch = out.with_name(f".{out.name}.part")
-    scratch.unlink(missing_ok=True)
     scans = codes = 0
-    try:
-        with RecordingWriter(scratch, info, "", notes=notes) as writer:
+    with scratch_folder(out) as scratch:
+        part = scratch / out.name
+        with RecordingWriter(part, info, "", notes=notes) as writer:
             writer.write(Received(FAST_EPOCH_NS, LogEntry(FAST_EPOCH_NS, LogLevel.INFO, _LEFT_OUT, "import")))
             for ranges_m in _rows(path):
                 stamp_ns = FAST_EPOCH_NS + round(scans * SECOND_NS / hz)
@@ -65,11 +65,7 @@ def import_lidar_csv(path: Path, out: Path, hz: float) -> ImportSummary:
                 codes += int(np.count_nonzero(ranges_m < 0.01))
         if not scans:
             raise RecordingError(f"{path}: holds no scans; nothing was imported")
-        if out.exists():
-            raise OutputExistsError(out)
-        scratch.rename(out)
-    finally:
-        scratch.unlink(missing_ok=True)
+        give_name(part, out)
     return ImportSummary(writer.recording_id, out, scans, (scans - 1) / hz, codes / (scans * RAYS))
 
 

@@ -1,35 +1,27 @@
 """Outputs that stand under their name only when they are whole."""
 
-import shutil
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-from sdt_tools.errors import DiskRefusedError, OutputExistsError, RecordingError
+from sdt_tools.errors import DiskRefusedError, OutputExistsError
+from sdt_tools.recording.scratch import give_name, scratch_folder
 
 
 @contextmanager
 def placed(out: Path, inner: str) -> Iterator[Path]:
     """A path called ``inner`` in a hidden folder beside ``out``; what is made there becomes ``out`` at the end.
 
-    Raises OutputExistsError where ``out`` exists, DiskRefusedError naming it where the disk refuses; then nothing is
-    left.
+    Raises OutputExistsError where ``out`` exists, RecordingError naming it where it cannot be made, DiskRefusedError
+    where the disk refuses; then nothing is left.
     """
     if out.exists():
         raise OutputExistsError(out)
-    scratch = out.with_name(f".{out.name}.part")
-    try:
-        shutil.rmtree(scratch, ignore_errors=True)
-        scratch.mkdir(parents=True)
-    except OSError as error:
-        raise RecordingError(f"{out}: cannot be made: {error.strerror}; choose another --out") from None
-    try:
+    with scratch_folder(out) as scratch:
         made = scratch / inner
-        yield made
-        if out.exists():
-            raise OutputExistsError(out)
-        made.rename(out)
-    except OSError as error:
-        raise DiskRefusedError(f"{out}: cannot be written: {error.strerror or error}; make room on that disk") from None
-    finally:
-        shutil.rmtree(scratch, ignore_errors=True)
+        try:
+            yield made
+        except OSError as error:
+            reason = error.strerror or error
+            raise DiskRefusedError(f"{out}: cannot be written: {reason}; make room on that disk") from None
+        give_name(made, out)

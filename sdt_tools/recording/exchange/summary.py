@@ -5,6 +5,7 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 
 from sdt_tools.recording.container.reader import Damage
+from sdt_tools.recording.reader import Recording
 
 
 @dataclass(frozen=True)
@@ -16,6 +17,11 @@ class ExportSummary:
     left_out: Mapping[str, int]
     truncated: bool
     damage: tuple[Damage, ...]
+
+    @classmethod
+    def of(cls, recording: Recording, out: Path, messages: Mapping[str, int]) -> "ExportSummary":
+        """Of ``recording``, all of which was read, with ``messages`` in ``out`` now."""
+        return cls(out, messages, recording.foreign_counts, recording.truncated, recording.damage)
 
     def document(self) -> dict[str, object]:
         """The summary for machines."""

@@ -48,6 +48,6 @@ class DropLog:
 def _entry(now_ns: int, topic: str, burst: _Burst) -> LogEntry:
     text = (
         f"{topic}: {burst.count} messages dropped, received from {burst.first_ns} to {burst.last_ns} ns: "
-        "they came faster than they could be written"
+        "they came faster than they could be encoded or written"
     )
     return LogEntry(now_ns, LogLevel.WARNING, text, "drops")

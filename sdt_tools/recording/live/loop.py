@@ -7,13 +7,14 @@ from typing import Final, Protocol, runtime_checkable
 
 from sdt_tools.clock import SECOND_NS
 from sdt_tools.errors import RecordingError, RunError, SdtError
-from sdt_tools.frames import LogEntry, LogLevel, Received, Twist
+from sdt_tools.frames import LogEntry, LogLevel, RawPicture, Received, Twist
 from sdt_tools.protocols import Actuator, Observer, Source
 from sdt_tools.recording.live.decide import DecisionLoop
+from sdt_tools.recording.live.encoder import PictureEncoder
 from sdt_tools.recording.live.interrupt import Interrupt
 from sdt_tools.recording.live.outcome import ENDING_BY_SIGNAL, Ending, RecordingProgress
 from sdt_tools.recording.live.pace import Pace
-from sdt_tools.recording.messages.topics import topic_of
+from sdt_tools.recording.messages.topics import CAMERA_IMAGE, topic_of
 
 _PROGRESS_S: Final = 0.25
 _STANDSTILL: Final = Twist(0.0, 0.0)
@@ -43,8 +44,12 @@ class Recorder(Protocol):
         """Take one message. Raises RecordingError where the disk refuses."""
         ...
 
-    def missing(self, received: Received) -> int:
-        """Take note of a message that was written; how many are missing just before it."""
+    def drop(self, topic: str, received_ns: int) -> None:
+        """Count a message that could not be taken in time."""
+        ...
+
+    def missing(self, topic: str, stamp_ns: int) -> int:
+        """Take note of a message that was written or dropped; how many are missing just before it."""
         ...
 
     def tick(self, now_ns: int) -> Iterable[LogEntry]:
@@ -69,7 +74,10 @@ class Recorder(Protocol):
 
 
 class LiveLoop:
-    """One source under way. ``run`` once, then ``close``: together they leave the robot standing, come what may."""
+    """One source under way. ``run`` once, then ``close``: together they leave the robot standing, come what may.
+
+    Raw pictures go through ``encoder``, which encodes at once unless another is given, and pass when they are encoded.
+    """
 
     def __init__(
         self,
@@ -80,6 +88,7 @@ class LiveLoop:
         observers: Sequence[Observer],
         recorder: Recorder,
         progress: Callable[[RecordingProgress], None] | None = None,
+        encoder: PictureEncoder | None = None,
     ) -> None:
         self._source = source
         self._actuator = actuator
@@ -88,6 +97,7 @@ class LiveLoop:
         self._observers = observers
         self._recorder = recorder
         self._progress = progress
+        self._encoder = encoder or PictureEncoder(behind=False)
         self._now_ns = source.start_ns
         self._reported_s = 0.0
         self._stands = False
@@ -113,6 +123,7 @@ class LiveLoop:
             ) from error
         try:
             self._stand_still()
+            self.settle()
             if ending in _LAST_WORDS:
                 self._log(LogLevel.INFO, _LAST_WORDS[ending])
             self._log_all(self._recorder.last_words(self._now_ns))
@@ -121,12 +132,20 @@ class LiveLoop:
         self._report(at_once=True)
         return ending
 
+    def settle(self) -> None:
+        """Wait for the pictures that are being encoded, and have them pass."""
+        try:
+            self._encoder.wait()
+        finally:
+            self._take_pictures()
+
     def close(self) -> None:
         """Stop the robot, if it does not stand yet, and close what was given."""
         try:
             if not self._stands:
                 self._stand_still()
         finally:
+            self._encoder.close()
             self._source.close()
             for observer in self._observers:
                 observer.close()
@@ -136,6 +155,8 @@ class LiveLoop:
             with suppress(OSError, SdtError):  # tried again by ``close``, which says so
                 self._stand_still()
             if not isinstance(error, RecordingError):
+                with suppress(SdtError):  # more pictures that cannot be encoded
+                    self.settle()
                 self._log(LogLevel.ERROR, f"the recording stopped: {type(error).__name__}: {error}")
                 self._log_all(self._recorder.last_words(self._now_ns))
         finally:
@@ -153,6 +174,7 @@ class LiveLoop:
             if end_ns is not None and now_ns >= end_ns:
                 self._read(end_ns - 1)
                 self._now_ns = end_ns
+                self.settle()
                 self._log_all(recorder.time_up(end_ns))
                 if recorder.ending is not None:
                     return recorder.ending
@@ -168,17 +190,31 @@ class LiveLoop:
 
     def _read(self, until_ns: int) -> None:
         self._now_ns = until_ns
-        for received in self._source.read(until_ns):
-            self._take(received)
+        for sensed in self._source.read(until_ns):
+            if isinstance(sensed, RawPicture):
+                self._encoder.put(sensed)
+            else:
+                self._take(sensed)
+            self._take_pictures()
+
+    def _take_pictures(self) -> None:
+        """Those that are encoded by now, and those that were dropped, in their order."""
+        while (picture := self._encoder.take()) is not None:
+            if isinstance(picture, Received):
+                self._take(picture)
+            else:
+                self._recorder.drop(CAMERA_IMAGE, picture.received_ns)
+                self._note_missing(CAMERA_IMAGE, picture.stamp_ns)
 
     def _take(self, received: Received) -> None:
         self._keep(received)
         self._decisions.see(received.message)
-        missing = self._recorder.missing(received)
+        self._note_missing(topic_of(received.message).name, received.message.stamp_ns)
+
+    def _note_missing(self, topic: str, stamp_ns: int) -> None:
+        missing = self._recorder.missing(topic, stamp_ns)
         if missing:
-            topic = topic_of(received.message).name
-            text = f"{topic}: {missing} messages missing before {received.message.stamp_ns} ns"
-            self._log(LogLevel.WARNING, text)
+            self._log(LogLevel.WARNING, f"{topic}: {missing} messages missing before {stamp_ns} ns")
 
     def _drive(self, now_ns: int) -> None:
         command = self._decisions.decide(now_ns)

@@ -6,6 +6,7 @@ When a queue is full:
 - a picture that arrives is dropped; those that wait stay, so that what is lost lies in one piece;
 - a scan or pose takes the place of the picture that has waited longest, and is dropped only where none waits: all
   queues together never hold more than their limits together;
+- a raw picture that arrives when its encoder has too many before it is dropped; those that wait stay;
 - commands, log entries, calibrations, transforms and what the operator shows are never dropped: they are small and few.
 """
 
@@ -32,10 +33,14 @@ class StreamLimit:
 
 @dataclass(frozen=True)
 class QueueLimits:
-    """Of pictures, of each other sensor's stream. The defaults hold about three seconds of one, five of the other."""
+    """Of pictures, of each other sensor's stream, of raw pictures on their way into the encoder.
+
+    The defaults hold about three seconds of pictures, encoded and raw, five of the others.
+    """
 
     pictures: StreamLimit = StreamLimit(90, 64 << 20)
     sensors: StreamLimit = StreamLimit(250, 16 << 20)
+    raw_pictures: StreamLimit = StreamLimit(90, 96 << 20)
 
     def of(self, message: Message) -> StreamLimit | None:
         """The limit for ``message``; None where it is never dropped."""

@@ -11,13 +11,14 @@ from sdt_tools.frames import LogEntry, Received
 from sdt_tools.protocols import Actuator, Driver, Expert, Observer, Source
 from sdt_tools.recording.live.decide import Deciders, DecisionLoop, Perturb
 from sdt_tools.recording.live.disk import DiskWatch
+from sdt_tools.recording.live.encoder import Encode, PictureEncoder, encode_jpeg
 from sdt_tools.recording.live.interrupt import Interrupt, deferred_interrupt
 from sdt_tools.recording.live.loop import LiveLoop
 from sdt_tools.recording.live.outcome import Ending, RecordingProgress, RecordingSummary
 from sdt_tools.recording.live.pace import paced
 from sdt_tools.recording.live.pressure import QueueLimits
 from sdt_tools.recording.live.sink import DirectSink, QueuedSink
-from sdt_tools.recording.live.take import Take, Tally, stats_of
+from sdt_tools.recording.live.take import Take, Tally
 from sdt_tools.recording.writer import RecordingWriter
 
 
@@ -39,14 +40,16 @@ def record(
     interrupt: Interrupt | None = None,
     limits: QueueLimits | None = None,
     disk: DiskWatch | None = None,
+    encode: Encode = encode_jpeg,
 ) -> RecordingSummary:
     """Record ``source`` for ``seconds`` (without, until it ends) while ``driver`` moves ``actuator``.
 
     The source is read in ticks of one scan period; with ``realtime`` ticks keep the pace of ``clock``, the host's
-    unless another is given, and a thread of its own writes: what it cannot keep up with is dropped as ``pressure``
-    says, and the recording ends before the ``disk`` is full. Ctrl-C, SIGTERM and SIGHUP end the recording as if its
-    time were up, and the summary says so; ``interrupt`` is what hears them, where the caller listens already. On every
-    way out the robot is told to stand still, and source and observers are closed; the writer is the caller's to close.
+    unless another is given, a thread of its own writes and another one encodes raw pictures by ``encode``: what they
+    cannot keep up with is dropped as ``pressure`` says, and the recording ends before the ``disk`` is full. Ctrl-C,
+    SIGTERM and SIGHUP end the recording as if its time were up, and the summary says so; ``interrupt`` is what hears
+    them, where the caller listens already. On every way out the robot is told to stand still, and source and observers
+    are closed; the writer is the caller's to close.
 
     Raises RunError where the source fails, after a word in ``/session/log``; RecordingError where the disk refuses.
     """
@@ -58,7 +61,8 @@ def record(
         return Tally(decisions.decisions, decisions.forced, pace.missed + decisions.missed)
 
     recorder = _OneTake(Take(sink, source.start_ns, seconds, rates, tally), writer)
-    loop = LiveLoop(source, actuator, decisions, pace, observers, recorder, progress)
+    encoder = PictureEncoder(realtime, limits, encode)
+    loop = LiveLoop(source, actuator, decisions, pace, observers, recorder, progress, encoder)
     try:
         if interrupt is not None:
             loop.run(interrupt)
@@ -91,14 +95,18 @@ class _OneTake:
         """Into the take."""
         self._take.write(received)
 
-    def missing(self, received: Received) -> int:
+    def drop(self, topic: str, received_ns: int) -> None:
         """From the take."""
-        return self._take.missing(received)
+        self._take.drop(topic, received_ns)
+
+    def missing(self, topic: str, stamp_ns: int) -> int:
+        """From the take."""
+        return self._take.missing(topic, stamp_ns)
 
     def tick(self, now_ns: int) -> Iterator[LogEntry]:
         """Watch the writer and the disk."""
         yield from self._take.watch(now_ns)
-        if self._take.space is not None and self._take.space.full:
+        if self._take.disk_is_full:
             self.ending = Ending.DISK
 
     def time_up(self, now_ns: int) -> list[LogEntry]:
@@ -109,15 +117,13 @@ class _OneTake:
 
     def last_words(self, now_ns: int) -> list[LogEntry]:
         """Drops that are not told yet."""
-        return self._take.sink.bursts(now_ns, at_end=True)
+        return self._take.last_words(now_ns)
 
     def end(self, ending: Ending, now_ns: int) -> None:
         """Note what came of it. Raises what the writer met while the last messages were written."""
         self._take.stop(now_ns)
-        self.summary = self._take.finish(ending)
-        self._writer.note(stats_of(self.summary))
-        if self._take.sink.failure is not None and ending is not Ending.FAILED:
-            raise self._take.sink.failure
+        self.summary = self._take.finish(ending, self._writer)
+        self._take.check(ending)
 
     def progress(self, now_ns: int) -> RecordingProgress:
         """Where the take stands."""

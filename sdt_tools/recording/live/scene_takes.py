@@ -12,6 +12,7 @@ from sdt_tools.errors import RunError
 from sdt_tools.protocols import Driver, Observer
 from sdt_tools.recording.live.control import Control
 from sdt_tools.recording.live.decide import Deciders, DecisionLoop
+from sdt_tools.recording.live.encoder import PictureEncoder
 from sdt_tools.recording.live.interrupt import Interrupt, deferred_interrupt
 from sdt_tools.recording.live.keep_last import KeepLast
 from sdt_tools.recording.live.loop import LiveLoop
@@ -74,7 +75,7 @@ def record_scene_takes(
         try:
             while True:
                 ending = _play_world(config, session, recorder, make_driver, interrupt, clock, observers(), progress)
-                if ending is not Ending.SOURCE or not recorder.wait_for_start(interrupt, clock.now_ns):
+                if ending is not Ending.SOURCE or not recorder.wait_for_start(interrupt, clock.now_ns, progress):
                     break
         except RunError as error:
             raise RunError(f"{folder}: {error}") from error.__cause__
@@ -121,8 +122,9 @@ def _play_world(
     def tally() -> Tally:
         return Tally(decisions.decisions, decisions.forced, pace.missed + decisions.missed)
 
-    recorder.begin(start_ns, open_writer, tally)
-    loop = LiveLoop(source, source, decisions, pace, observers, recorder, progress)
+    encoder = PictureEncoder(behind=config.realtime)
+    loop = LiveLoop(source, source, decisions, pace, observers, recorder, progress, encoder)
+    recorder.begin(start_ns, open_writer, tally, loop.settle)
     try:
         return loop.run(interrupt)
     finally:

@@ -82,7 +82,7 @@ class SessionFolder:
 
     @classmethod
     def resume(cls, folder: Path, config: Config) -> "SessionFolder":
-        """The session in ``folder``, to be gone on with.
+        """The session in ``folder``, to be gone on with; takes that were restored from the trash are kept ones again.
 
         Raises RecordingError where there is none, ConfigError for one that cannot be read, ChangedConfigError for one
         that was begun with another config.
@@ -93,7 +93,7 @@ class SessionFolder:
         differences = config_differences(record.config, _values(config))
         if differences:
             raise ChangedConfigError(folder, differences)
-        return cls(folder, record)
+        return cls(folder, record.model_copy(update={"takes": tuple(_as_it_lies(folder, t) for t in record.takes)}))
 
     @property
     def record(self) -> SessionRecord:
@@ -148,12 +148,13 @@ class SessionFolder:
 
     def discard(self, path: Path, reason: str, now_ns: int) -> None:
         """Move the take at ``path`` to the trash. Raises RecordingError where it cannot be moved."""
-        self._update(path, {"trash": str(discard(path, reason, now_ns).relative_to(self.folder))})
+        self._update(path, {"trash": str(discard(path, reason, now_ns).relative_to(self.folder.resolve()))})
 
     def last_kept(self) -> Path | None:
         """The last take that is closed and lies where it was recorded; files of the ring are none."""
         kept = [take for take in self._record.takes if take.ending and not take.trash and not take.trigger]
-        return self.folder / kept[-1].name if kept else None
+        paths = (self.folder / take.name for take in reversed(kept))
+        return next((path for path in paths if path.is_file()), None)
 
     def _update(self, path: Path, changes: Mapping[str, object]) -> None:
         with self._changing():
@@ -189,6 +190,10 @@ def config_differences(before: Mapping[str, Any], now: Mapping[str, Any]) -> tup
         for key in sorted(old.keys() | new.keys())
         if old.get(key) != new.get(key)
     )
+
+
+def _as_it_lies(folder: Path, take: TakeEntry) -> TakeEntry:
+    return take.model_copy(update={"trash": ""}) if take.trash and (folder / take.name).is_file() else take
 
 
 def _values(config: Config) -> dict[str, Any]:

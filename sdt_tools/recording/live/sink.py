@@ -52,6 +52,10 @@ class Sink(Protocol):
         """Take one message. Raises what the file's writer raised."""
         ...
 
+    def drop(self, topic: str, received_ns: int) -> None:
+        """Count a message that was given up on its way here."""
+        ...
+
     def keep_safe(self) -> None:
         """To be called often, also when nothing arrives. Raises what the file's writer raised."""
         ...
@@ -74,7 +78,7 @@ class DirectSink:
     def __init__(self, writer: RecordingWriter) -> None:
         self.path = writer.path
         self.recording_id = writer.recording_id
-        self.dropped: Mapping[str, int] = {}
+        self._drops = DropLog()
         self._writer = writer
 
     @property
@@ -87,25 +91,33 @@ class DirectSink:
         """Messages written so far, by topic."""
         return dict(self._writer.counts)
 
+    @property
+    def dropped(self) -> Mapping[str, int]:
+        """Messages given up on their way here: none, where pictures are encoded at once."""
+        return dict(self._drops.counts)
+
     def write(self, received: Received) -> None:
         """Write one message."""
         self._writer.write(received)
+
+    def drop(self, topic: str, received_ns: int) -> None:
+        """Count it."""
+        self._drops.drop(topic, received_ns)
 
     def keep_safe(self) -> None:
         """Flush and sync where it is time."""
         self._writer.keep_safe()
 
     def bursts(self, now_ns: int, at_end: bool = False) -> list[LogEntry]:
-        """None: nothing is dropped here."""
-        del now_ns, at_end
-        return []
+        """Entries about what was dropped, one a burst."""
+        return self._drops.due(now_ns, at_end)
 
     def finish(self) -> None:
         """Nothing waits."""
 
 
 class QueuedSink:
-    """Encodes, compresses and writes in a thread of its own, so that neither disk nor encoder delays who calls.
+    """Compresses and writes in a thread of its own, so that the disk does not delay who calls.
 
     The queues and who gives way in them are described in ``pressure``. Until ``finish`` the writer belongs to the
     thread. Where the writer fails, what waits and what still comes is dropped, and ``write`` and ``keep_safe`` raise
@@ -157,6 +169,11 @@ class QueuedSink:
                 self._drop(victim)
             self._changed.notify()
         self.keep_safe()
+
+    def drop(self, topic: str, received_ns: int) -> None:
+        """Count a message that was given up on its way here."""
+        with self._changed:
+            self._drops.drop(topic, received_ns)
 
     def keep_safe(self) -> None:
         """Raise what the thread has met; it flushes by itself."""

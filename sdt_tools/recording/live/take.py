@@ -11,7 +11,9 @@ from sdt_tools.recording.live.disk import DiskSpace
 from sdt_tools.recording.live.gaps import GapCounter
 from sdt_tools.recording.live.outcome import Ending, RecordingProgress, RecordingSummary
 from sdt_tools.recording.live.sink import Sink
-from sdt_tools.recording.messages.topics import CAMERA_IMAGE, LIDAR_SCAN, topic_of
+from sdt_tools.recording.messages.topics import CAMERA_IMAGE, LIDAR_SCAN
+from sdt_tools.recording.timing.pauses import PAUSES, pauses_text
+from sdt_tools.recording.writer import RecordingWriter
 
 
 @dataclass(frozen=True)
@@ -67,9 +69,9 @@ class Take:
         return self.start_ns + self._length_ns + self._paused_ns
 
     @property
-    def space(self) -> DiskSpace | None:
-        """Room on the disk, where it is watched."""
-        return self.sink.space
+    def disk_is_full(self) -> bool:
+        """Whether the recording has to end for want of room."""
+        return self.sink.space is not None and self.sink.space.full
 
     @property
     def _paused_ns(self) -> int:
@@ -85,15 +87,20 @@ class Take:
         if not self.paused:
             self.sink.write(received)
 
-    def missing(self, received: Received) -> int:
-        """Take note of a message that has passed; how many are missing from the recording just before it."""
-        gap = self._gaps.get(topic_of(received.message).name)
+    def drop(self, topic: str, received_ns: int) -> None:
+        """Count a message that was given up before it could be recorded, unless paused."""
+        if not self.paused:
+            self.sink.drop(topic, received_ns)
+
+    def missing(self, topic: str, stamp_ns: int) -> int:
+        """Take note of a message that has passed or was dropped; how many never came just before it."""
+        gap = self._gaps.get(topic)
         if gap is None:
             return 0
         if self.paused:
-            gap.pass_over(received.message.stamp_ns)
+            gap.pass_over(stamp_ns)
             return 0
-        return gap.see(received.message.stamp_ns)
+        return gap.see(stamp_ns)
 
     def pause(self, now_ns: int) -> None:
         """Leave out what comes from ``now_ns`` on."""
@@ -119,16 +126,30 @@ class Take:
             if space.low:
                 yield LogEntry(now_ns, LogLevel.WARNING, _low(space), "disk")
 
+    def last_words(self, now_ns: int) -> list[LogEntry]:
+        """Entries about drops that are not told yet, to be recorded before the end."""
+        return self.sink.bursts(now_ns, at_end=True)
+
     def stop(self, now_ns: int) -> None:
         """Nothing comes after ``now_ns``: what was counted up to here is this take's."""
         self.resume(now_ns)
         self._ended = _Ended(self.recorded_s(now_ns), perf_counter() - self._began_s, self._tally())
 
-    def finish(self, ending: Ending) -> RecordingSummary:
-        """After ``stop``, in whatever thread: wait until all is with the writer; what was recorded.
+    def finish(self, ending: Ending, writer: RecordingWriter) -> RecordingSummary:
+        """After ``stop``, in whatever thread: wait until all is with ``writer``, note in it what was recorded.
 
-        Where the writer has failed by then, the ending is FAILED and ``sink.failure`` says why.
+        Where the writer has failed by then, the ending is FAILED and ``check`` says why.
         """
+        summary = self._summary(ending)
+        writer.note(stats_of(summary))
+        return summary
+
+    def check(self, ending: Ending) -> None:
+        """Raise what the writer has met while the last messages were written, unless ``ending`` tells of it."""
+        if self.sink.failure is not None and ending is not Ending.FAILED:
+            raise self.sink.failure
+
+    def _summary(self, ending: Ending) -> RecordingSummary:
         assert self._ended is not None
         self.sink.finish()
         ended, before = self._ended, self._before
@@ -177,7 +198,7 @@ def stats_of(summary: RecordingSummary) -> dict[str, str]:
         **{f"missing.{topic}": str(count) for topic, count in summary.missing.items()},
     }
     if summary.pauses_ns:
-        stats["pauses_ns"] = " ".join(f"{start_ns}-{end_ns}" for start_ns, end_ns in summary.pauses_ns)
+        stats[PAUSES] = pauses_text(summary.pauses_ns)
     return stats
 
 

@@ -18,7 +18,8 @@ from sdt_tools.recording.live.latched import Latched
 from sdt_tools.recording.live.outcome import Ending, RecordingProgress
 from sdt_tools.recording.live.session_folder import SessionFolder
 from sdt_tools.recording.live.sink import DirectSink, QueuedSink
-from sdt_tools.recording.live.take import Take, Tally, stats_of
+from sdt_tools.recording.live.take import Take, Tally
+from sdt_tools.recording.timing.pauses import paused_entry, resumed_entry
 from sdt_tools.recording.writer import RecordingWriter
 
 _LISTEN_S: Final = 0.05
@@ -63,9 +64,17 @@ class TakeRecorder:
         self._starts = keep_last is None
         self._marks = 0
         self._began_ns = 0
+        self._done = ""
+        """What was done last of what was wanted: whoever pressed a key looks for it."""
 
-    def begin(self, start_ns: int, open_writer: OpenWriter, tally: Callable[[], Tally]) -> None:
-        """A source starts at ``start_ns``; its takes are opened by ``open_writer``."""
+    def begin(
+        self, start_ns: int, open_writer: OpenWriter, tally: Callable[[], Tally], settle: Callable[[], None]
+    ) -> None:
+        """A source starts at ``start_ns``; its takes are opened by ``open_writer``.
+
+        ``settle`` has all that was received so far recorded, pictures that are being encoded too.
+        """
+        self._settle = settle
         self._open_writer = open_writer
         self._tally = tally
         self._latched = Latched()
@@ -78,10 +87,17 @@ class TakeRecorder:
         """Wait until all files are closed. Raises what went wrong with one."""
         self._clerk.close()
 
-    def wait_for_start(self, interrupt: Interrupt, now_ns: Callable[[], int]) -> bool:
+    def wait_for_start(
+        self,
+        interrupt: Interrupt,
+        now_ns: Callable[[], int],
+        progress: Callable[[RecordingProgress], None] | None = None,
+    ) -> bool:
         """While no source runs: whether another one is to start, for the next take. False where all is to end."""
         while self._control is not None and interrupt.signal is None:
             self._clerk.check()
+            if progress is not None:
+                progress(self._idle("the source has ended"))
             act = self._control.wait(_LISTEN_S)
             if act is None:
                 continue
@@ -111,17 +127,21 @@ class TakeRecorder:
         if self._running is not None:
             self._running.take.write(received)
 
-    def missing(self, received: Received) -> int:
+    def drop(self, topic: str, received_ns: int) -> None:
         """From the take that runs."""
-        return 0 if self._running is None else self._running.take.missing(received)
+        if self._running is not None:
+            self._running.take.drop(topic, received_ns)
+
+    def missing(self, topic: str, stamp_ns: int) -> int:
+        """From the take that runs."""
+        return 0 if self._running is None else self._running.take.missing(topic, stamp_ns)
 
     def tick(self, now_ns: int) -> Iterator[LogEntry]:
         """Do what is wanted, save the ring where something has happened, watch writer and disk."""
         self._clerk.check()
         if self._running is not None:
             yield from self._running.take.watch(now_ns)
-            space = self._running.take.space
-            if space is not None and space.full:
+            if self._running.take.disk_is_full:
                 self.ending = Ending.DISK
         for act in self._control.heard() if self._control is not None else ():
             yield from self._do(act, now_ns)
@@ -139,7 +159,7 @@ class TakeRecorder:
     def last_words(self, now_ns: int) -> Iterator[LogEntry]:
         """Drops that are not told yet."""
         if self._running is not None:
-            yield from self._running.take.sink.bursts(now_ns, at_end=True)
+            yield from self._running.take.last_words(now_ns)
 
     def end(self, ending: Ending, now_ns: int) -> None:
         """The source is through: the running take ends, and the ring is saved where it is due."""
@@ -150,12 +170,21 @@ class TakeRecorder:
     def progress(self, now_ns: int) -> RecordingProgress:
         """Where the running take stands."""
         if self._running is None:
-            return RecordingProgress(0.0, None, 0.0, {}, 0, 0, 0, state="no take is running")
+            kept = f", the last {self._keep_last.seconds:g} s are kept" if self._keep_last is not None else ""
+            return self._idle(f"no take is running{kept}")
         paused = " paused" if self._running.take.paused else ""
-        return self._running.take.progress(now_ns, f"{self._running.path.stem}{paused}")
+        return self._running.take.progress(now_ns, f"{self._running.path.stem}{paused}{self._told}")
+
+    def _idle(self, state: str) -> RecordingProgress:
+        return RecordingProgress(0.0, None, 0.0, {}, 0, 0, 0, state=f"{state}{self._told}")
+
+    @property
+    def _told(self) -> str:
+        return f" ({self._done})" if self._done else ""
 
     def _do(self, act: Act, now_ns: int) -> Iterator[LogEntry]:
         """One wish. An entry is recorded before this goes on, which is why a pause is told before it begins."""
+        self._settle()  # what was received before the wish belongs to what was before it
         running = self._running
         wish = act.wish
         if wish is Wish.TOGGLE:
@@ -171,15 +200,15 @@ class TakeRecorder:
             self.ending = self.ending or Ending.STOPPED
         elif wish is Wish.MARK:
             self._marks += 1
-            yield LogEntry(now_ns, LogLevel.INFO, act.text or f"mark {self._marks}", "mark")
+            self._done = act.text or f"mark {self._marks}"
+            yield LogEntry(now_ns, LogLevel.INFO, self._done, "mark")
         elif wish is Wish.SAVE and self._keep_last is not None:
             self._keep_last.trigger(act.text or "a key", now_ns)
         elif wish is Wish.PAUSE and running is not None and not running.take.paused:
-            yield LogEntry(now_ns, LogLevel.INFO, "paused: nothing is recorded until it is resumed", "pause")
+            yield paused_entry(now_ns)
             running.take.pause(now_ns)
         elif wish is Wish.RESUME and running is not None and running.take.paused:
-            lasted_s = running.take.resume(now_ns)
-            yield LogEntry(now_ns, LogLevel.INFO, f"resumed after a pause of {lasted_s:.3f} s", "pause")
+            yield resumed_entry(now_ns, running.take.resume(now_ns))
         if wish in (Wish.START, Wish.NEXT) and self._running is None:
             self._start(now_ns)
 
@@ -201,20 +230,20 @@ class TakeRecorder:
             self._clerk.do(partial(self._finish, running, ending))
 
     def _finish(self, running: _Running, ending: Ending) -> None:
-        summary = running.take.finish(ending)
-        running.writer.note(stats_of(summary))
+        summary = running.take.finish(ending, running.writer)
         try:
             running.writer.close()
         finally:
             self._folder.ended(running.path, summary)
-        if running.take.sink.failure is not None and ending is not Ending.FAILED:
-            raise running.take.sink.failure
+            self._done = f"{running.path.stem} kept"
+        running.take.check(ending)
 
     def _discard_last(self, now_ns: int) -> None:
         def discard() -> None:
             path = self._folder.last_kept()
             if path is not None:
                 self._folder.discard(path, "discarded while recording", now_ns)
+            self._done = "nothing to discard" if path is None else f"{path.stem} discarded"
 
         self._clerk.do(discard)
 
@@ -239,7 +268,8 @@ class TakeRecorder:
                 writer.write(received)
             writer.note({"ending": "saved", "seconds": f"{seconds:.3f}"})
         if path.exists():
-            raise OutputExistsError(path)
+            raise OutputExistsError(path, None)
         part.rename(path)
         self._folder.started(path, first_ns, notes["trigger"])
         self._folder.saved(path, seconds, len(snapshot.messages))
+        self._done = f"{path.stem} saved"

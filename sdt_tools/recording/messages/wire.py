@@ -41,6 +41,12 @@ class ScanFields(NamedTuple):
 
 def varint(value: int) -> bytes:
     """``value`` ≥ 0 in base 128, least significant group first."""
+    if value < 0x80:
+        return bytes((value,))
+    if value < 0x4000:
+        return bytes((value & 0x7F | 0x80, value >> 7))
+    if value < 0x20_0000:
+        return bytes((value & 0x7F | 0x80, value >> 7 & 0x7F | 0x80, value >> 14))
     groups = bytearray()
     while value > 0x7F:
         groups.append(value & 0x7F | 0x80)
@@ -60,9 +66,9 @@ def encode_image(stamp_ns: int, frame_id: str, data: bytes, image_format: str) -
     return b"".join(
         (
             _stamp_field(stamp_ns),
-            _bytes_field(_IMAGE_DATA_TAG, data),
-            _bytes_field(_IMAGE_FORMAT_TAG, image_format.encode()),
-            _bytes_field(_IMAGE_FRAME_TAG, frame_id.encode()),
+            bytes((_IMAGE_DATA_TAG,)) + varint(len(data)) if data else b"",
+            data,  # copied once
+            _image_kind(frame_id, image_format),
         )
     )
 
@@ -125,6 +131,12 @@ def _bytes_field(tag: int, value: bytes) -> bytes:
 
 def _double_field(tag: int, packed: bytes) -> bytes:
     return bytes((tag,)) + packed if packed != _ZERO else b""
+
+
+@lru_cache
+def _image_kind(frame_id: str, image_format: str) -> bytes:
+    """What stands behind the data of an image: the same for all images of a camera."""
+    return _bytes_field(_IMAGE_FORMAT_TAG, image_format.encode()) + _bytes_field(_IMAGE_FRAME_TAG, frame_id.encode())
 
 
 @lru_cache

@@ -36,12 +36,18 @@ def drift_of(stamps_ns: Int64[np.ndarray, "messages"], delays_ns: Int64[np.ndarr
     """
     if len(stamps_ns) < _LEAST_BLOCKS or stamps_ns[-1] - stamps_ns[0] < SHORTEST_NS:
         return None
-    blocks = np.array_split(np.arange(len(stamps_ns)), min(_BLOCKS, len(stamps_ns)))
     at_ns = (stamps_ns - stamps_ns[0]).astype(np.float64)
     late_ns = (delays_ns - delays_ns[0]).astype(np.float64)
-    return _theil_sen(
-        np.array([np.median(at_ns[block]) for block in blocks]),
-        np.array([np.median(late_ns[block]) for block in blocks]),
+    return _theil_sen(_block_medians(at_ns), _block_medians(late_ns))
+
+
+def _block_medians(values: Float64[np.ndarray, "messages"]) -> Float64[np.ndarray, "points"]:
+    """Medians of at most 200 blocks in order; where the number does not divide, the first are longer by one."""
+    blocks = min(_BLOCKS, len(values))
+    size, longer = divmod(len(values), blocks)
+    head, tail = np.split(values, [longer * (size + 1)])
+    return np.concatenate(
+        [np.median(head.reshape(longer, size + 1), axis=1), np.median(tail.reshape(blocks - longer, size), axis=1)]
     )
 
 

@@ -11,7 +11,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from sdt_tools.clock import SECOND_NS
-from sdt_tools.errors import OutputExistsError, RunError
+from sdt_tools.errors import DiskRefusedError, OutputExistsError
 from sdt_tools.recording.messages.topics import CAMERA_IMAGE, LIDAR_SCAN, SENSORS
 from sdt_tools.recording.timing.pairs import TOLERANCE_NS, pair_skews
 from sdt_tools.recording.timing.pauses import Pauses, spans_pause
@@ -30,10 +30,10 @@ _MOST_POINTS: Final = 20_000
 def timing_figure(log: StampLog, pauses: Pauses, out: Path, title: str) -> None:
     """Draw what ``log`` saw of the sensors to the PNG ``out``; ``pauses`` are grey.
 
-    Raises OutputExistsError where ``out`` exists, RunError where it cannot be written.
+    Raises OutputExistsError where ``out`` exists, DiskRefusedError where it cannot be written.
     """
     if out.exists():
-        raise OutputExistsError(out)
+        raise OutputExistsError(out, "--plot")
     seen = dict(log.topics())
     sensors: dict[str, TopicStamps] = {name: seen[name] for name in SENSORS if name in seen}
     begin_ns = min((int(stamps.stamps_ns.min()) for stamps in sensors.values()), default=0)
@@ -167,7 +167,8 @@ def _save(figure: Figure, out: Path) -> None:
         figure.savefig(part, dpi=110, format="png")
         part.rename(out)
     except OSError as error:
-        raise RunError(f"{out}: the picture cannot be written: {error.strerror}; choose another --plot") from None
+        reason = error.strerror
+        raise DiskRefusedError(f"{out}: the picture cannot be written: {reason}; choose another --plot") from None
     finally:
         with suppress(OSError):
             part.unlink()

@@ -44,8 +44,8 @@ class StampLog:
         times = self._times.get(topic)
         if times is None:
             times = self._times[topic] = array("q"), array("q")
-        times[0].append(min(received_ns, _LATEST_NS))
-        times[1].append(min(stamp_ns, _LATEST_NS))
+        times[0].append(received_ns if received_ns < _LATEST_NS else _LATEST_NS)
+        times[1].append(stamp_ns if stamp_ns < _LATEST_NS else _LATEST_NS)
 
     def topics(self) -> Iterator[tuple[str, TopicStamps]]:
         """What was seen, topic by topic in the order of their names."""

@@ -55,8 +55,8 @@ def test_people_get_counts_by_class(folder: Path) -> None:
     ("file", "options", "message"),
     [
         ("spacing = 1", [], r"config\.toml: unknown key 'spacing'; did you mean 'spacing_s'"),
-        ("", ["--val-share", "1.5"], "the options: 'val_share': input should be less than 1"),
-        ("", ["--conflict-level", "7"], "the options: 'conflict_level'"),
+        ("", ["--val-share", "1.5"], "--val-share: input should be less than 1"),
+        ("", ["--conflict-level", "7"], "--conflict-level: input"),
     ],
 )
 def test_a_wrong_setting_is_named_with_its_place(folder: Path, file: str, options: list[str], message: str) -> None:

@@ -23,7 +23,7 @@ def watch(changes: dict[str, object], until_s: float, timeout_s: float = 90.0) -
     judge = Judge(timeout_s, SuccessConfig())
     time_s = 0.0
     while time_s <= until_s:
-        verdict = judge.see(replace(FOLLOWING, **changes, time_s=time_s))  # type: ignore[arg-type]
+        verdict = judge.see(replace(FOLLOWING, **changes, time_s=time_s))
         if verdict:
             return verdict, time_s
         time_s += 0.1

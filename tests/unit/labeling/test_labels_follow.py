@@ -142,9 +142,14 @@ def test_recordings_that_overlap_must_not_call_one_frame_differently(tmp_path: P
     assert (tmp_path / "new.mcap").exists()
 
 
-def test_where_the_journals_cannot_be_written_there_is_no_recording_either(tmp_path: Path, drive: Path) -> None:
+def test_where_the_journals_cannot_be_written_there_is_no_recording_either(
+    tmp_path: Path, drive: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def refuse(journal: Journal, _acts: object) -> int:
+        raise LabelError(f"{journal.path}: cannot be opened for writing")
+
     plan = plan_trim(drive, "0", "0.9", tmp_path / "new.mcap")
-    (tmp_path / "labels/.new.mcap.labels").write_text("in the way")
+    monkeypatch.setattr(Journal, "append_table", refuse)
     with pytest.raises(LabelError, match="cannot be opened for writing"):
         edit_with_labels(plan, tmp_path / "labels")
     assert sorted(path.name for path in tmp_path.iterdir()) == ["drive.mcap", "labels"]

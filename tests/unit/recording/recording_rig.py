@@ -107,7 +107,7 @@ class Rig:
                 RateConfig(),
                 MotionConfig(),
                 seconds,
-                **options,  # type: ignore[arg-type]
+                **options,
             )
 
     def read(self) -> list[Received]:
@@ -126,7 +126,7 @@ class Rig:
 def rig(tmp_path: Path, scans: int = 100, **source: object) -> Rig:
     messages = sorted((m for n in range(scans) for m in (scan(n), image(n, 100))), key=lambda m: m.received_ns)
     messages = [m for m in messages if m.received_ns < T0 + scans * PERIOD_NS]
-    return Rig(tmp_path / "r.mcap", TapeSource(messages, **source))  # type: ignore[arg-type]
+    return Rig(tmp_path / "r.mcap", TapeSource(messages, **source))
 
 
 class HandClock(HostClock):

@@ -26,6 +26,7 @@ from sdt_tools.frames import (
     OperatorPose,
     OperatorState,
     Pose2D,
+    RawPicture,
     Received,
     Twist,
 )
@@ -51,6 +52,12 @@ def image(number: int, size: int = 3000) -> Received:
     """Image ``number``: bytes that do not compress, in the place of a JPEG."""
     stamp_ns = T0 + number * 33_333_333
     return Received(stamp_ns, CameraImage(stamp_ns, np.random.default_rng(number).bytes(size)))
+
+
+def raw_picture(number: int) -> RawPicture:
+    """Image ``number`` as a camera gives it."""
+    stamp_ns = T0 + number * 33_333_333
+    return RawPicture(stamp_ns, stamp_ns, np.full((12, 16, 3), number * 10 % 256, np.uint8))
 
 
 def one_of_each(stamp_ns: int = T0) -> list[Received]:

@@ -19,16 +19,18 @@ from exchange_samples import (
 from hypothesis import given
 from hypothesis import strategies as st
 from recording_samples import T0, write
-from rosbags.rosbag2 import StoragePlugin, Writer
+from rosbags.rosbag2 import Reader, StoragePlugin, Writer
 
 from sdt_tools.config import MotionConfig
 from sdt_tools.errors import OutputExistsError, RecordingError, UsageError
 from sdt_tools.frames import CameraImage, MotionClass, MotionCommand, Odometry, Twist
+from sdt_tools.recording.container.reader import McapReader
 from sdt_tools.recording.exchange.ros2.importing import RosImportSummary, import_ros2
 from sdt_tools.recording.exchange.ros2.inward import Taking, nearest_motion
 from sdt_tools.recording.exchange.ros2.pictures import LOSSLESS, PictureFormat
 from sdt_tools.recording.exchange.ros2.routes import Wanted
 from sdt_tools.recording.reader import Recording
+from sdt_tools.recording.repair import repair_recording
 
 LATER = T0 + 7_654_321
 SQLITE, MCAP = StoragePlugin.SQLITE3, StoragePlugin.MCAP
@@ -251,18 +253,18 @@ def test_what_is_no_bag_is_refused_in_one_line_and_nothing_is_left(tmp_path: Pat
         "missing": "no such bag; check the path",
         "folder": r"has no metadata\.yaml; name the folder of one ROS 2 bag",
         "unindexed": r"has no metadata\.yaml; name unindexed\.db3 itself, or `ros2 bag reindex` it",
-        "corrupt": "cannot be read as a ROS 2 bag: .*not a database",
-        "late": "cannot be read as a ROS 2 bag: .*malformed",
-        "cut": "cannot be read as a ROS 2 bag: File end magic is invalid",
-        "flipped": "cannot be read as a ROS 2 bag: Invalid MCAP",
-        "mangled": "cannot be read as a ROS 2 bag: .*YAML",
+        "corrupt": "a ROS 2 bag that is damaged or unfinished: .*not a database",
+        "late": "a ROS 2 bag that is damaged or unfinished: .*malformed",
+        "cut/cut.mcap": "the bag was cut off; finish it first with `sdt repair",
+        "flipped": "a ROS 2 bag that is damaged or unfinished: Invalid MCAP",
+        "mangled": "a ROS 2 bag that is damaged or unfinished: .*YAML",
         "old.bag": "a bag of ROS 1; convert it",
         "notes.txt": "not a ROS 2 bag; give its folder, or a .db3 or .mcap file",
         "empty.db3": "is empty",
         "ours.mcap": "an MCAP, but not of ROS 2",
     }.items():
         with pytest.raises(RecordingError, match=rf"{name}: {said}") as error:
-            bring(tmp_path / name, tmp_path / "r.mcap")
+            bring(tmp_path / name.split("/")[0], tmp_path / "r.mcap")
         assert "\n" not in str(error.value)
     assert sorted(tmp_path.rglob("*")) == before
 
@@ -273,3 +275,37 @@ def test_an_existing_output_is_left_alone(tmp_path: Path) -> None:
     with pytest.raises(OutputExistsError):
         bring(bag, tmp_path / "r.mcap")
     assert (tmp_path / "r.mcap").read_text() == "mine"
+
+
+@pytest.mark.parametrize("tenths", [5, 7, 9])
+def test_a_bag_that_was_cut_comes_in_once_it_is_repaired(tmp_path: Path, tenths: int) -> None:
+    messages = [("/scan", LATER + n, laser_scan(T0 + n * 20_000_000)) for n in range(400)]
+    whole = next(write_bag(tmp_path / "bag", messages).glob("*.mcap"))
+    cut = tmp_path / "cut.mcap"
+    cut.write_bytes(whole.read_bytes()[: whole.stat().st_size * tenths // 10])
+    with pytest.raises(RecordingError, match=r"cut off; finish it first with `sdt repair .*cut\.mcap --out NEW\.mcap`"):
+        bring(cut, tmp_path / "r.mcap")
+    report = repair_recording(cut, tmp_path / "repaired.mcap")
+    assert 0 < report.messages["/scan"] <= 400
+    with Reader(tmp_path / "repaired.mcap") as reader:
+        received = [received_ns for _, received_ns, _ in reader.messages()]
+    assert received == [LATER + n for n in range(report.messages["/scan"])]
+    bring(tmp_path / "repaired.mcap", tmp_path / "r.mcap")
+    with Recording.open(tmp_path / "r.mcap") as recording:
+        assert list(recording.scans().stamps_ns) == [T0 + n * 20_000_000 for n in range(len(received))]
+
+
+def test_a_bag_with_a_damaged_chunk_comes_in_once_it_is_repaired(tmp_path: Path) -> None:
+    messages = [("/scan", LATER + n, laser_scan(T0 + n * 20_000_000)) for n in range(800)]
+    bag = next(write_bag(tmp_path / "bag", messages).glob("*.mcap"))
+    with McapReader(bag) as source:
+        chunk = source.segments()[1]
+    data = bytearray(bag.read_bytes())
+    data[chunk.offset : chunk.offset + 100] = bytes(100)
+    bag.write_bytes(data)
+    with pytest.raises(RecordingError, match=r"cannot be read as a ROS 2 bag.*`sdt repair` saves what can be read"):
+        bring(bag, tmp_path / "r.mcap")
+    report = repair_recording(bag, tmp_path / "repaired.mcap")
+    assert report.damage
+    summary = bring(tmp_path / "repaired.mcap", tmp_path / "r.mcap")
+    assert summary.messages["/lidar/scan"] == report.messages["/scan"]

@@ -1,6 +1,8 @@
 """What goes out comes back equal: to the byte of every message, to the nanosecond of every stamp."""
 
+import struct
 import tracemalloc
+from collections import Counter
 from pathlib import Path
 
 import numpy as np
@@ -11,6 +13,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from recording_samples import T0, image, read_by_mcap, write
 from rosbags.highlevel import AnyReader
+from ruamel.yaml import YAML
 
 from sdt_tools.errors import OutputExistsError, RecordingError
 from sdt_tools.frames import FrameTransform, LidarScan, LogEntry, LogLevel, MotionClass, MotionCommand, Received, Twist
@@ -42,14 +45,21 @@ def test_parquet_and_back_every_byte_is_equal(tmp_path: Path) -> None:
     assert as_it_lies(tmp_path / "back.mcap") == as_it_lies(there)
 
 
+def untimed(path: Path) -> tuple[list[tuple[str, int, int, bytes]], dict[str, dict[str, str]]]:
+    """What lies in ``path``, without timing: the samples are older than that."""
+    messages, metadata = as_it_lies(path)
+    stats = {name: text for name, text in metadata["sdt.stats"].items() if not name.startswith("timing.")}
+    return messages, metadata | {"sdt.stats": stats}
+
+
 @pytest.mark.parametrize("sample", SAMPLES, ids=lambda path: path.stem)
 def test_the_samples_come_back_as_they_went(tmp_path: Path, sample: Path) -> None:
     export_ros2(sample, tmp_path / "bag")
     import_ros2(tmp_path / "bag", tmp_path / "ros2.mcap", *DEFAULT)
     export_parquet(sample, tmp_path / "folder")
     import_parquet(tmp_path / "folder", tmp_path / "parquet.mcap")
-    assert as_it_lies(tmp_path / "ros2.mcap") == as_it_lies(sample)
-    assert as_it_lies(tmp_path / "parquet.mcap") == as_it_lies(sample)
+    assert untimed(tmp_path / "ros2.mcap") == untimed(sample)
+    assert untimed(tmp_path / "parquet.mcap") == untimed(sample)
     with Recording.open(sample) as there, Recording.open(tmp_path / "ros2.mcap") as back:
         assert back.recording_id == there.recording_id
         assert back.config_toml == there.config_toml
@@ -131,6 +141,63 @@ def test_the_mcap_package_sees_a_bag_of_ros2(tmp_path: Path) -> None:
     assert {(schema.encoding, channel.message_encoding) for schema, channel, _ in messages} == {("ros2msg", "cdr")}
     with (tmp_path / "bag" / "bag.mcap").open("rb") as file:
         assert b"ros2" in file.read(40)
+
+
+def test_the_bags_metadata_are_what_rosbag2_reads(tmp_path: Path) -> None:
+    """Fields of version 8, as rosbag2's own ``yaml.hpp`` asks for them."""
+    export_ros2(full_recording(tmp_path / "r.mcap"), tmp_path / "bag")
+    (document,) = YAML(typ="safe").load((tmp_path / "bag/metadata.yaml").read_text()).values()
+    written = list(read_by_mcap(tmp_path / "bag/bag.mcap"))
+    times = [message.log_time for _, _, message in written]
+    about_time = {
+        "starting_time": {"nanoseconds_since_epoch": min(times)},
+        "duration": {"nanoseconds": max(times) - min(times)},
+        "message_count": len(written),
+    }
+    assert document | about_time == document
+    assert (document["version"], document["storage_identifier"]) == (8, "mcap")
+    assert document["relative_file_paths"] == ["bag.mcap"]
+    assert document["files"] == [{"path": "bag.mcap", **about_time}]
+    assert (document["compression_format"], document["compression_mode"]) == ("", "")
+    assert all(isinstance(text, str) for text in [document["ros_distro"], *document["custom_data"].values()])
+    found = {topic["topic_metadata"]["name"]: topic for topic in document["topics_with_message_count"]}
+    for _, channel, _ in written:
+        topic = found[channel.topic]["topic_metadata"]
+        assert topic["serialization_format"] == channel.message_encoding == "cdr"
+        assert topic["type_description_hash"].startswith("RIHS01_")
+        assert topic["offered_qos_profiles"] == channel.metadata["offered_qos_profiles"]
+    counts = Counter(channel.topic for _, channel, _ in written)
+    assert counts == {name: topic["message_count"] for name, topic in found.items()}
+    (latched,) = YAML(typ="safe").load(found["/tf_static"]["topic_metadata"]["offered_qos_profiles"])
+    assert (latched["durability"], latched["reliability"], latched["depth"]) == (1, 1, 1)  # rmw's transient, reliable
+
+
+def test_a_scan_of_the_bag_is_plain_cdr(tmp_path: Path) -> None:
+    """Read by its definition alone: four bytes of encapsulation, then fields aligned to their size."""
+    export_ros2(full_recording(tmp_path / "r.mcap"), tmp_path / "bag.mcap")
+    schema, _, message = next(found for found in read_by_mcap(tmp_path / "bag.mcap") if found[1].topic == "/lidar/scan")
+    assert schema.name == "sensor_msgs/msg/LaserScan"
+    fields = [line.split() for line in schema.data.decode().split("=====")[0].splitlines() if line]
+    assert fields == [
+        ["std_msgs/Header", "header"],
+        *(["float32", f"angle_{name}"] for name in ("min", "max", "increment")),
+        *(["float32", name] for name in ("time_increment", "scan_time", "range_min", "range_max")),
+        *(["float32[]", name] for name in ("ranges", "intensities")),
+    ]
+    assert message.data[:4] == b"\x00\x01\x00\x00"
+    body = message.data[4:]
+    seconds, nanoseconds, length = struct.unpack_from("<iII", body)
+    assert body[12 : 12 + length] == b"lidar\0"
+    at = (12 + length + 3) // 4 * 4
+    angles = struct.unpack_from("<fff", body, at)
+    assert angles == pytest.approx((-0.75 * np.pi, 0.75 * np.pi, np.pi / 360), abs=1e-6)
+    (rays,) = struct.unpack_from("<I", body, at + 28)
+    with Recording.open(tmp_path / "r.mcap") as recording:
+        first = next(m.message for m in recording.messages(["/lidar/scan"]))
+    assert isinstance(first, LidarScan)
+    assert seconds * 10**9 + nanoseconds == first.stamp_ns
+    assert np.array_equal(np.frombuffer(body, "<f4", rays, at + 32), first.ranges_m.astype(np.float32))
+    assert len(body) == at + 32 + 4 * rays + 4
 
 
 def test_polars_reads_our_parquet(tmp_path: Path) -> None:

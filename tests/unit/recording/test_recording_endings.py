@@ -98,7 +98,7 @@ def test_drops_are_in_the_summary_the_stats_the_log_and_the_progress(
             at_end.set()
 
     monkeypatch.setattr(RecordingWriter, "write", stuck)
-    setup.wheels.command = until_it_stands  # type: ignore[method-assign]
+    setup.wheels.command = until_it_stands
     limits = QueueLimits(StreamLimit(10, 1 << 20), StreamLimit(20, 1 << 20))
     summary = setup.run(seconds=1.0, **real(setup, limits=limits, progress=told.append)[1])
     lost = {"/lidar/scan": summary.dropped["/lidar/scan"], "/camera/image": summary.dropped["/camera/image"]}

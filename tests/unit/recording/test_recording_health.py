@@ -22,7 +22,7 @@ def timing(scans: Stream | None = SCANS, images: Stream | None = IMAGES) -> Timi
 
 def judged(scans: Stream | None = SCANS, images: Stream | None = IMAGES, **state: object) -> tuple[Health, str]:
     """The verdict, and the worst reason for it."""
-    reasons = health_reasons(timing(scans, images), FileState(**state))  # type: ignore[arg-type]
+    reasons = health_reasons(timing(scans, images), FileState(**state))
     return verdict(reasons), reasons[0].text if reasons else ""
 
 

@@ -7,7 +7,7 @@ from mcap.writer import CompressionType, Writer
 from recording_samples import CONFIG, INFO, T0, image, one_of_each, scan, write
 from timing_samples import MS_NS, Stream, together
 
-from sdt_tools.errors import OutputExistsError, RecordingError, RunError
+from sdt_tools.errors import DiskRefusedError, OutputExistsError, RecordingError
 from sdt_tools.frames import Odometry, Pose2D, Received
 from sdt_tools.recording.inspect import InspectReport, draw_timing, inspect_recording
 from sdt_tools.recording.live.drivers import ExpertDriver
@@ -245,7 +245,7 @@ def test_timing_is_drawn_and_never_over_another_picture(tmp_path: Path) -> None:
     with pytest.raises(OutputExistsError, match="exists already"):
         draw_timing(report, tmp_path / "timing.png")
     draw_timing(report, tmp_path / "new" / "timing.png")
-    with pytest.raises(RunError, match=r"cannot be written: (Not a directory|File exists)"):
+    with pytest.raises(DiskRefusedError, match=r"cannot be written: (Not a directory|File exists)"):
         draw_timing(report, tmp_path / "r.mcap" / "timing.png")
 
 

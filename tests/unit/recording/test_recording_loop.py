@@ -167,7 +167,7 @@ def test_in_real_time_the_source_is_read_at_the_pace_of_the_clock(tmp_path: Path
     setup = rig(tmp_path)
     reads: list[int] = []
     read = setup.source.read
-    setup.source.read = lambda until_ns: (reads.append(until_ns), read(until_ns))[1]  # type: ignore[method-assign]
+    setup.source.read = lambda until_ns: (reads.append(until_ns), read(until_ns))[1]
     summary = setup.run(seconds=1.0, realtime=True, clock=clock, sleep_s=clock.sleep)
     assert reads == [T0 + n * PERIOD_NS for n in range(1, 50)] + [T0 + SECOND_NS - 1]
     assert summary.missed_deadlines == 0
@@ -183,7 +183,7 @@ def test_a_slow_driver_in_real_time_loses_decisions_but_no_scan(tmp_path: Path) 
         clock.sleep(0.25)
         return decide(observation)
 
-    setup.driver.decide = slow  # type: ignore[method-assign]
+    setup.driver.decide = slow
     summary = setup.run(seconds=1.0, realtime=True, clock=clock, sleep_s=clock.sleep)
     scans = [m for m in setup.read() if m.message.stamp_ns in {s.message.stamp_ns for s in map(scan, range(50))}]
     assert summary.frames["/lidar/scan"] >= 49

@@ -103,7 +103,7 @@ def test_a_burst_of_drops_is_one_entry_with_its_count_and_interval() -> None:
     (entry,) = drops.due(T0 + 2 * SECOND_NS)
     assert entry.text == (
         f"/camera/image: 30 messages dropped, received from {T0} to {T0 + 29} ns: "
-        "they came faster than they could be written"
+        "they came faster than they could be encoded or written"
     )
     assert drops.due(T0 + 3 * SECOND_NS) == []
     assert drops.counts == {"/camera/image": 30}

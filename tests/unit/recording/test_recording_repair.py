@@ -138,7 +138,8 @@ def test_topics_of_others_come_along(tmp_path: Path) -> None:
     with (tmp_path / "new.mcap").open("rb") as stream:
         reader = make_reader(stream, validate_crcs=True)
         found = [(s.name if s else "", c.topic, c.message_encoding, c.metadata) for s, c, _ in reader.iter_messages()]
-        assert [a.data for a in reader.iter_attachments()] == [b"hello"]
+        assert [(a.data, a.create_time, a.log_time) for a in reader.iter_attachments()] == [(b"hello", 1, 2)]
+        assert (reader.get_header().profile, reader.get_header().library) == ("ros2", "other")
         assert {m.name for m in reader.iter_metadata()} == {"theirs", "sdt.repair"}
     assert found.count(("pkg/msg/Thing", "/thing", "cdr", {"offered_qos": "best"})) == 100
     assert found.count(("", "/bare", "json", {})) == 100

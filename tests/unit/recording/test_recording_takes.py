@@ -1,20 +1,23 @@
 """Sessions: take after take under somebody's controls, resumed, and the last seconds kept."""
 
 import os
+import time
 import tomllib
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 
+import numpy as np
 import pytest
 from recording_rig import Forward, HandClock, TapeSource, Wheels
-from recording_samples import CONFIG, INFO, PERIOD_NS, T0, image, one_of_each, read_by_mcap, scan
+from recording_samples import CONFIG, INFO, PERIOD_NS, T0, image, one_of_each, raw_picture, read_by_mcap, scan
 
 from sdt_tools.clock import SECOND_NS
 from sdt_tools.config import Config, MotionConfig, RateConfig
 from sdt_tools.errors import RecordingError, RunError
 from sdt_tools.frames import (
     CameraCalibration,
+    CameraImage,
     FrameTransform,
     LidarScan,
     LogEntry,
@@ -27,6 +30,7 @@ from sdt_tools.frames import (
 )
 from sdt_tools.recording.live.control import Control, Wish
 from sdt_tools.recording.live.decide import Deciders, DecisionLoop
+from sdt_tools.recording.live.encoder import Encode, PictureEncoder, encode_jpeg
 from sdt_tools.recording.live.interrupt import Interrupt
 from sdt_tools.recording.live.keep_last import KeepLast, Ring
 from sdt_tools.recording.live.loop import LiveLoop
@@ -36,6 +40,7 @@ from sdt_tools.recording.live.session_folder import ChangedConfigError, SessionF
 from sdt_tools.recording.live.take import Tally
 from sdt_tools.recording.live.takes import TakeRecorder
 from sdt_tools.recording.reader import Recording
+from sdt_tools.recording.trash import restore
 from sdt_tools.recording.writer import RecordingWriter
 
 
@@ -78,6 +83,8 @@ class Session:
     extra: list[Received] = field(default_factory=list)
     happens: dict[int, BaseException | int] = field(default_factory=dict)
     wheels: Wheels = field(default_factory=Wheels)
+    encode: Encode | None = None
+    """With it pictures come raw."""
 
     def run(
         self, keys: Mapping[int, Wish] | None, seconds: float | None = None, keep_last: KeepLast | None = None
@@ -85,7 +92,8 @@ class Session:
         control = None if keys is None else Control()
         recorder = TakeRecorder(self.folder, RateConfig(), seconds, self.realtime, control, keep_last)
         introduction = [one for one in one_of_each(T0) if isinstance(one.message, CameraCalibration | FrameTransform)]
-        messages = [m for n in range(self.scans) for m in (scan(n), image(n, 100))]
+        pictures = [image(n, 100) if self.encode is None else raw_picture(n) for n in range(self.scans)]
+        messages = [*map(scan, range(self.scans)), *pictures]
         messages = [m for m in messages if m.received_ns < T0 + self.scans * PERIOD_NS]
         tape = [Received(T0, m.message) for m in introduction]
         tape += sorted([*messages, *self.extra], key=lambda m: m.received_ns)
@@ -97,11 +105,13 @@ class Session:
         def open_writer(path: Path, notes: Mapping[str, str], start_ns: int, realtime: bool) -> RecordingWriter:
             return RecordingWriter(path, INFO, CONFIG, notes=notes, start_ns=start_ns, realtime=realtime)
 
-        recorder.begin(
-            T0, open_writer, lambda: Tally(decisions.decisions, decisions.forced, pace.missed + decisions.missed)
-        )
+        def tally() -> Tally:
+            return Tally(decisions.decisions, decisions.forced, pace.missed + decisions.missed)
+
         observers = [Fingers(control, keys)] if control is not None and keys is not None else []
-        loop = LiveLoop(source, self.wheels, decisions, pace, observers, recorder)
+        encoder = PictureEncoder(self.realtime, encode=self.encode or encode_jpeg)
+        loop = LiveLoop(source, self.wheels, decisions, pace, observers, recorder, encoder=encoder)
+        recorder.begin(T0, open_writer, tally, loop.settle)
         try:
             return loop.run(Interrupt())
         finally:
@@ -148,6 +158,26 @@ def test_the_next_take_begins_where_the_last_one_ends_and_nothing_is_between(ses
         ("take_001.mcap", "stopped"),
         ("take_002.mcap", "stopped"),
     ]
+
+
+def test_pictures_that_are_still_encoded_belong_to_the_take_they_were_received_in(session: Session) -> None:
+    def slow(_image_bgr_u8: np.ndarray) -> bytes:
+        time.sleep(0.003)
+        return b"jpeg"
+
+    session.encode = slow
+    session.run({20: Wish.NEXT, 40: Wish.PAUSE, 50: Wish.RESUME, 60: Wish.QUIT})
+    first, second = (session.read(f"take_00{number}.mcap") for number in (1, 2))
+    images = [m for m in (*first, *second) if isinstance(m.message, CameraImage)]
+    ticks = [(m.received_ns - T0) // PERIOD_NS for m in images]
+    stamps = [m.message.stamp_ns for m in images]
+    assert stamps == sorted(set(stamps))
+    assert not set(ticks) & set(range(42, 50))
+    assert set(stamps) >= {T0 + n * 33_333_333 for n in (*range(24), *range(31, 36))}
+    (start_ns,) = (m.received_ns for m in second if isinstance(m.message, CameraCalibration))
+    assert min(m.received_ns for m in second if isinstance(m.message, CameraImage)) >= start_ns
+    last_scan_ns = max(m.received_ns for m in first if isinstance(m.message, LidarScan))
+    assert max(m.received_ns for m in first) - last_scan_ns <= PERIOD_NS
 
 
 def test_a_later_take_begins_with_calibration_and_transforms_received_at_its_start(session: Session) -> None:
@@ -198,6 +228,54 @@ def test_the_last_take_kept_is_discarded_when_none_runs(session: Session) -> Non
     assert [(take.name, bool(take.trash)) for take in session.listed()] == [
         ("take_001.mcap", False),
         ("take_002.mcap", True),
+    ]
+
+
+def begun(path: Path) -> SessionFolder:
+    """A session with one take that was kept."""
+    folder = SessionFolder.create(path, Settings(), "the-session")
+    take = folder.next_path("take")
+    take.write_bytes(b"a take")
+    folder.started(take, T0)
+    folder.saved(take, 1.0, 1)
+    return folder
+
+
+def test_a_relative_folder_has_its_trash_too(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    folder = begun(Path("recordings/monday"))
+    folder.discard(Path("recordings/monday/take_001.mcap"), "", T0)
+    (take,) = folder.record.takes
+    assert (tmp_path / "recordings/monday" / take.trash / take.name).exists()
+
+
+def test_a_take_that_is_gone_is_not_the_last_one_kept(tmp_path: Path) -> None:
+    folder = begun(tmp_path / "s")
+    first = folder.last_kept()
+    assert first is not None
+    first.unlink()
+    assert folder.last_kept() is None
+
+
+def test_a_take_that_was_restored_is_kept_again_when_the_session_goes_on(tmp_path: Path) -> None:
+    folder = begun(tmp_path / "s")
+    folder.discard(tmp_path / "s/take_001.mcap", "", T0)
+    assert SessionFolder.resume(folder.folder, Settings()).last_kept() is None
+    restore(folder.folder, "take_001")
+    assert SessionFolder.resume(folder.folder, Settings()).last_kept() == tmp_path / "s/take_001.mcap"
+
+
+def test_whoever_presses_keys_is_told_what_came_of_it(tmp_path: Path) -> None:
+    shown: list[str] = []
+    control, signals = Control(), Interrupt()
+    recorder = TakeRecorder(begun(tmp_path / "s"), RateConfig(), None, False, control)
+    for wish in (Wish.DISCARD, Wish.DISCARD, Wish.QUIT):
+        control.want(wish)
+    assert not recorder.wait_for_start(signals, lambda: T0, lambda now: shown.append(now.state))
+    assert shown == [
+        "the source has ended",
+        "the source has ended (take_001 discarded)",
+        "the source has ended (nothing to discard)",
     ]
 
 

@@ -1,3 +1,4 @@
+import os
 import resource
 import signal
 import subprocess
@@ -12,6 +13,7 @@ from recording_samples import CONFIG, INFO, T0, image, one_of_each, read_by_mcap
 
 from sdt_tools.errors import OutputExistsError, RecordingError
 from sdt_tools.protocols import SourceInfo
+from sdt_tools.recording.container.file import McapFile
 from sdt_tools.recording.inspect import inspect_recording
 from sdt_tools.recording.reader import Recording
 from sdt_tools.recording.writer import RecordingWriter
@@ -67,11 +69,11 @@ def test_the_stats_count_and_carry_what_is_noted(tmp_path: Path) -> None:
 )
 def test_the_identity_changes_with_what_the_recording_is_made_from(tmp_path: Path, other: dict[str, object]) -> None:
     usual = {"info": SourceInfo("scene", "plain", 7), "config_toml": CONFIG, "notes": {"model": "a"}}
-    with RecordingWriter(tmp_path / "usual.mcap", **usual) as one:  # type: ignore[arg-type]
+    with RecordingWriter(tmp_path / "usual.mcap", **usual) as one:
         pass
-    with RecordingWriter(tmp_path / "same.mcap", **usual) as same:  # type: ignore[arg-type]
+    with RecordingWriter(tmp_path / "same.mcap", **usual) as same:
         pass
-    with RecordingWriter(tmp_path / "other.mcap", **(usual | other)) as two:  # type: ignore[arg-type]
+    with RecordingWriter(tmp_path / "other.mcap", **(usual | other)) as two:
         pass
     assert one.recording_id == same.recording_id != two.recording_id
 
@@ -227,3 +229,35 @@ def test_where_the_end_has_no_room_the_last_chunks_make_some(tmp_path: Path, sca
     assert bool(lost) == bool(refused)
     assert len(read) + lost == writer.counts.total()
     assert inspect_recording(path, full=True).disagreements == ()
+
+
+def test_as_fast_as_it_can_the_disk_takes_what_is_written_while_it_goes_on(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    drive = [message for n in range(60) for message in (scan(n), image(n))]
+    all_at_close = write(tmp_path / "a.mcap", drive, chunk_bytes=30_000)
+    sizes: list[int] = []
+    monkeypatch.setattr("sdt_tools.recording.writer.SYNC_BYTES", 50_000)
+    monkeypatch.setattr(McapFile, "sync", lambda file: sizes.append(file.size))
+    bit_by_bit = write(tmp_path / "b.mcap", drive, chunk_bytes=30_000)
+    assert sizes
+    assert sizes[0] < bit_by_bit.stat().st_size
+    assert bit_by_bit.read_bytes() == all_at_close.read_bytes()
+
+
+def test_a_disk_that_cannot_keep_what_it_took_is_heard(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def fails(_file: McapFile) -> None:
+        raise OSError(5, "Input/output error")
+
+    monkeypatch.setattr("sdt_tools.recording.writer.SYNC_BYTES", 50_000)
+    monkeypatch.setattr(McapFile, "sync", fails)
+    with pytest.raises(RecordingError, match=r"the disk failed to keep what was written: .*Input/output error"):
+        write(tmp_path / "r.mcap", [image(n) for n in range(60)], chunk_bytes=30_000)
+
+
+def test_a_disk_that_takes_less_than_it_is_given_gets_the_rest(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    drive = [message for n in range(20) for message in (scan(n), image(n))]
+    at_once = write(tmp_path / "a.mcap", drive, chunk_bytes=30_000)
+    monkeypatch.setattr(os, "writev", lambda descriptor, parts: os.write(descriptor, b"".join(parts)[:1000]))
+    in_parts = write(tmp_path / "b.mcap", drive, chunk_bytes=30_000)
+    assert in_parts.read_bytes() == at_once.read_bytes()

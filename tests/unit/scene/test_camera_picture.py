@@ -10,7 +10,8 @@ from PIL import Image
 
 from sdt_tools.errors import ConfigError
 from sdt_tools.frames import Gesture, Pose2D
-from sdt_tools.scene.camera import SceneCamera, encode_jpeg, gesture_of_arms
+from sdt_tools.recording.live.encoder import encode_jpeg
+from sdt_tools.scene.camera import SceneCamera, gesture_of_arms
 from sdt_tools.scene.layout import Box, GestureEvent, Post, Wall
 from sdt_tools.scene.rendering.light import KINDS
 

@@ -11,15 +11,16 @@ from sdt_tools.config import MotionConfig, RateConfig, parse_config
 from sdt_tools.errors import ConfigError
 from sdt_tools.frames import (
     CameraCalibration,
-    CameraImage,
     FrameTransform,
     Gesture,
     LidarScan,
     LogEntry,
+    Message,
     MotionClass,
     Odometry,
     OperatorPose,
     OperatorState,
+    RawPicture,
     Received,
     Twist,
 )
@@ -31,9 +32,9 @@ from sdt_tools.scene.source import SceneSource
 STEP_NS = SECOND_NS // 50
 
 
-def played(source: SceneSource, seconds: float, motion: MotionClass | None = None) -> list[Received]:
+def played(source: SceneSource, seconds: float, motion: MotionClass | None = None) -> list[Received | RawPicture]:
     """Everything of the first ``seconds``, driven by ``motion`` or by the expert at 10 Hz."""
-    received: list[Received] = []
+    received: list[Received | RawPicture] = []
     for tick in range(round(seconds * 50) + 1):
         received += source.read(source.start_ns + tick * STEP_NS)
         if tick % 5 == 0:
@@ -41,8 +42,12 @@ def played(source: SceneSource, seconds: float, motion: MotionClass | None = Non
     return received
 
 
-def stamps(received: list[Received], kind: type) -> list[int]:
-    return [item.message.stamp_ns - FAST_EPOCH_NS for item in received if isinstance(item.message, kind)]
+def sensed(received: list[Received | RawPicture]) -> list[Message | RawPicture]:
+    return [item.message if isinstance(item, Received) else item for item in received]
+
+
+def stamps(received: list[Received | RawPicture], kind: type) -> list[int]:
+    return [item.stamp_ns - FAST_EPOCH_NS for item in sensed(received) if isinstance(item, kind)]
 
 
 def test_it_is_a_source_an_actuator_and_has_an_expert() -> None:
@@ -112,7 +117,7 @@ def test_the_operators_state_comes_when_it_changes_and_every_second() -> None:
     received = played(SceneSource(layout_for("plain", 1)), 4.0)
 
     assert stamps(received, OperatorState) == [round(s * SECOND_NS) for s in (0.0, 1.0, 1.5, 2.5, 3.5)]
-    states = [item.message for item in received if isinstance(item.message, OperatorState)]
+    states = [item for item in sensed(received) if isinstance(item, OperatorState)]
     assert [state.gesture for state in states][:3] == [Gesture.ENABLE, Gesture.ENABLE, Gesture.IDLE]
 
 
@@ -121,7 +126,7 @@ def test_a_contact_ends_the_scene_and_is_logged() -> None:
 
     received = played(source, 6.0, MotionClass.FORWARD)
 
-    entries = [item.message for item in received if isinstance(item.message, LogEntry)]
+    entries = [item for item in sensed(received) if isinstance(item, LogEntry)]
     assert [entry.text for entry in entries] == ["the robot touched operator"]
     assert source.finished
     assert list(source.read(source.start_ns + 60 * SECOND_NS)) == []
@@ -167,11 +172,11 @@ def test_with_a_camera_images_and_gestures_come_in_step() -> None:
     received = played(source, 0.2)
 
     expected = [round(i * SECOND_NS / 30) for i in range(7)]
-    assert stamps(received, CameraImage) == expected
+    assert stamps(received, RawPicture) == expected
     assert set(expected) <= set(stamps(received, OperatorState))
     assert len(stamps(received, CameraCalibration)) == 1
     assert [item.received_ns for item in received] == sorted(item.received_ns for item in received)
-    assert Counter(type(item.message) for item in received)[FrameTransform] == 2
+    assert Counter(type(item) for item in sensed(received))[FrameTransform] == 2
 
 
 def test_closing_twice_is_fine() -> None:

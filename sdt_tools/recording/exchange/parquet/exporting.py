@@ -9,12 +9,14 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 
 from sdt_tools.errors import RecordingError
-from sdt_tools.recording.exchange.carried import Carried, Outgoing
+from sdt_tools.recording.exchange.about import about_of
+from sdt_tools.recording.exchange.carried import Carried, outgoing
 from sdt_tools.recording.exchange.parquet.columns import PLACE, RECEIVED, STAMP, arrow_schema, to_columns
 from sdt_tools.recording.exchange.parquet.manifest import Manifest, TopicFile, write_manifest
 from sdt_tools.recording.exchange.placing import placed
 from sdt_tools.recording.exchange.summary import ExportSummary
 from sdt_tools.recording.messages.topics import CAMERA_IMAGE, TOPIC_BY_NAME, Topic
+from sdt_tools.recording.reader import Recording
 from sdt_tools.recording.session import SOFTWARE
 
 _GROUP_ROWS: Final = 1024
@@ -27,11 +29,10 @@ def export_parquet(path: Path, out: Path) -> ExportSummary:
 
     Raises RecordingError for what is no recording or holds no messages, OutputExistsError, DiskRefusedError.
     """
-    with Outgoing(path) as outgoing, placed(out, out.name) as folder:
-        if not outgoing.topics:
-            raise RecordingError(f"{path}: holds no messages; there is nothing to export")
+    with Recording.open(path) as recording, placed(out, out.name) as folder:
+        about = about_of(recording)
         folder.mkdir()
-        rows = _write(outgoing, folder)
+        rows = _write(recording, folder)
         files = {
             topic: TopicFile(file=file_name(topic), topic_schema=TOPIC_BY_NAME[topic].schema, rows=count)
             for topic, count in rows.items()
@@ -39,14 +40,14 @@ def export_parquet(path: Path, out: Path) -> ExportSummary:
         manifest = Manifest(
             software=SOFTWARE,
             recording=path.name,
-            session=dict(outgoing.about.session),
-            stats=dict(outgoing.about.stats),
-            config_toml=outgoing.about.config_toml,
+            session=dict(about.session),
+            stats=dict(about.stats),
+            config_toml=about.config_toml,
             topics=files,
         )
         write_manifest(manifest, folder)
         _check(folder, manifest)
-        return ExportSummary(out, rows, outgoing.left_out, outgoing.truncated, outgoing.damage)
+        return ExportSummary.of(recording, out, rows)
 
 
 def file_name(topic: str) -> str:
@@ -99,10 +100,10 @@ class _TopicWriter:
         self._size = 0
 
 
-def _write(outgoing: Outgoing, folder: Path) -> dict[str, int]:
+def _write(recording: Recording, folder: Path) -> dict[str, int]:
     writers: dict[str, _TopicWriter] = {}
     with ExitStack() as closing:
-        for place, carried in enumerate(outgoing.messages()):
+        for place, carried in enumerate(outgoing(recording)):
             topic = carried.topic
             writer = writers.get(topic.name)
             if writer is None:

@@ -8,11 +8,13 @@ from rosbags.interfaces import Connection, Qos, QosDurability, QosHistory, QosLi
 from rosbags.rosbag2 import Reader, StoragePlugin, Writer
 
 from sdt_tools.errors import RecordingError
-from sdt_tools.recording.exchange.carried import Outgoing
+from sdt_tools.recording.exchange.about import about_of
+from sdt_tools.recording.exchange.carried import outgoing
 from sdt_tools.recording.exchange.placing import placed
 from sdt_tools.recording.exchange.ros2.outward import TRANSFORM, Sent, to_ros
 from sdt_tools.recording.exchange.ros2.types import type_store
 from sdt_tools.recording.exchange.summary import ExportSummary
+from sdt_tools.recording.reader import Recording
 
 _VERSION: Final = 8
 """Of the bag's metadata: what every distribution since Humble reads."""
@@ -42,25 +44,23 @@ def export_ros2(path: Path, out: Path) -> ExportSummary:
     is_file = out.suffix == ".mcap"
     name = out.stem if is_file else out.name
     with (
-        Outgoing(path) as outgoing,
+        Recording.open(path) as recording,
         placed(out, f"{name}/{name}.mcap" if is_file else name) as made,
     ):
         bag = made.parent if is_file else made
-        messages = _write(outgoing, bag)
+        messages = _write(recording, bag)
         _check(bag, sum(messages.values()))
-        return ExportSummary(out, messages, outgoing.left_out, outgoing.truncated, outgoing.damage)
+        return ExportSummary.of(recording, out, messages)
 
 
-def _write(outgoing: Outgoing, bag: Path) -> dict[str, int]:
-    if not outgoing.topics:
-        raise RecordingError(f"{outgoing.path}: holds no messages; there is nothing to export")
+def _write(recording: Recording, bag: Path) -> dict[str, int]:
     writer = Writer(bag, version=_VERSION, storage_plugin=StoragePlugin.MCAP)
-    for name, text in outgoing.about.texts().items():
+    for name, text in about_of(recording).texts().items():
         writer.set_custom_data(name, text)
     connections: dict[str, Connection] = {}
     counts: dict[str, int] = {}
     with writer:
-        for received_ns, sent in _sent(outgoing):
+        for received_ns, sent in _sent(recording):
             connection = connections.get(sent.topic)
             if connection is None:
                 connection = connections[sent.topic] = writer.add_connection(
@@ -74,8 +74,8 @@ def _write(outgoing: Outgoing, bag: Path) -> dict[str, int]:
     return dict(sorted(counts.items()))
 
 
-def _sent(outgoing: Outgoing) -> Iterator[tuple[int, Sent]]:
-    for carried in outgoing.messages():
+def _sent(recording: Recording) -> Iterator[tuple[int, Sent]]:
+    for carried in outgoing(recording):
         for sent in to_ros(carried):
             yield carried.received_ns, sent
 

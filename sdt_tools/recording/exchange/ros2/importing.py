@@ -10,7 +10,7 @@ import numpy as np
 import tomli_w
 from rosbags.serde import SerdeError
 
-from sdt_tools.errors import OutputExistsError, RecordingError
+from sdt_tools.errors import OutputExistsError, RecordingError, UsageError
 from sdt_tools.frames import RAYS
 from sdt_tools.protocols import SourceInfo
 from sdt_tools.recording.copying import new_file
@@ -120,7 +120,7 @@ class _Tally:
 def _routes(bag: Bag, wanted: Wanted) -> Routes:
     try:
         return choose_topics(bag.topics, wanted)
-    except RecordingError as error:
+    except UsageError as error:
         raise RecordingError(f"{bag.path}: {error}") from None
 
 
