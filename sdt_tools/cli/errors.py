@@ -5,7 +5,7 @@ from typing import Annotated
 
 import typer
 
-from sdt_tools.cli import errors_claims, errors_compare, errors_suspects
+from sdt_tools.cli import errors_claims, errors_compare, errors_selftest, errors_suspects
 from sdt_tools.cli.console import JsonFlag, console, emit, print_incomplete
 from sdt_tools.cli.default_command import WithDefault
 
@@ -18,6 +18,7 @@ app = typer.Typer(
 
 app.command("claims")(errors_claims.command)
 app.command("compare")(errors_compare.command)
+app.command("selftest")(errors_selftest.command)
 
 
 @app.callback()
