@@ -111,7 +111,7 @@ def bound_figure(
         errors = np.bincount(place[wrong], minlength=len(edges) - 1)
         axes.stairs(100.0 * errors / np.maximum(frames, 1), edges, fill=True, color="#c62828", alpha=0.65)
     low, high = axes.get_xlim()
-    bound = float(predicate.value)
+    bound = predicate.bound
     inside = (low, bound) if predicate.operator == "<" else (bound, high)
     axes.axvspan(*inside, color=TAG_COLOURS[Tag.CONDITIONAL], alpha=0.18, linewidth=0)
     axes.axvline(bound, color=TAG_COLOURS[Tag.CONDITIONAL], linewidth=1.5)

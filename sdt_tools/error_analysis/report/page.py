@@ -122,7 +122,7 @@ def _bounds(number: int, condition: Condition, features: Features, frames: Label
     """A picture for each bound: the errors over its feature, among the frames that the rest of the condition holds."""
     pictures = []
     for place, predicate in enumerate(condition.predicates):
-        if isinstance(predicate.value, str) or predicate.feature not in features.numeric:
+        if not predicate.is_bound or predicate.feature not in features.numeric:
             continue
         others = _without_feature(condition, predicate).mask(features)
         values = features.numeric[predicate.feature][others]

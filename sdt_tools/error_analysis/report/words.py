@@ -41,16 +41,17 @@ def verdict_in_words(verdict: Verdict) -> str:
 
 
 def _predicate_in_words(predicate: Predicate) -> str:
-    feature, value = predicate.feature, predicate.value
-    if isinstance(value, str):
+    feature = predicate.feature
+    if not predicate.is_bound:
         if feature.startswith("in_level_"):
-            where = "inside a" if value == "true" else "outside every"
+            where = "inside a" if predicate.names == ("true",) else "outside every"
             return f"the scan lies {where} safety domain of level {feature.removeprefix('in_level_')}"
-        return _NAMES[feature].format(value.replace("_", " ")) if feature in _NAMES else predicate.text
+        names = " or ".join(name.replace("_", " ") for name in predicate.names)
+        return _NAMES[feature].format(names) if feature in _NAMES else predicate.text
     if feature not in _NUMBERS:
         return predicate.text
     before, unit, after, scale = _NUMBERS[feature]
     than = "less than" if predicate.operator == "<" else "at least"
-    bound = f"{than} {value * scale:.3g}{'' if unit == '°' else ' '}{unit}"
+    bound = f"{than} {predicate.bound * scale:.3g}{'' if unit == '°' else ' '}{unit}"
     words = (bound, before, after) if feature == "invalid_share" else (before, bound, after)
     return " ".join(word for word in words if word)
