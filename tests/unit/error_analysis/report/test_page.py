@@ -77,8 +77,8 @@ def test_nothing_comes_from_outside(analysed: Path) -> None:
 
 def test_condition_support_and_p_are_told_in_words(analysed: Path) -> None:
     text = unescape(page_of(analysed / "errors"))
-    assert "1. When the nearest thing ahead is less than 1 m away" in text
-    assert "front_range_m < 1" in text
+    assert "1. When the right answer is stay" in text
+    assert "motion = stay" in text
     assert "Mean loss 1.00 inside against 0.00 outside, +1.00 (95 % interval +1.00 to +1.00)" in text
 
 
