@@ -5,6 +5,7 @@ from typing import Annotated
 
 import typer
 
+from sdt_tools.cli import errors_claims, errors_compare
 from sdt_tools.cli.console import JsonFlag, console, emit, print_incomplete
 from sdt_tools.cli.default_command import WithDefault
 
@@ -13,6 +14,10 @@ app = typer.Typer(
     no_args_is_help=True,
     help="Say of every wrong frame why it is wrong. Without a sub-command named: analyse.",
 )
+
+
+app.command("claims")(errors_claims.command)
+app.command("compare")(errors_compare.command)
 
 
 @app.callback()
@@ -32,14 +37,17 @@ def analyse(
     config: Annotated[Path | None, typer.Option(help="TOML file of options, such as loss, eta and epsilon_m.")] = None,
     json_output: JsonFlag = False,
 ) -> None:
-    """Tag every wrong frame: systematic, conditional (and on what), transient, isolated or unexplained."""
+    """Tag every wrong frame: systematic, conditional (and on what), transient, isolated or unexplained.
+
+    While it works, the scans lie in a nameless file beside --out, 2.2 kB each: they need not fit in memory.
+    """
     from sdt_tools.cli.progress import progress_bar
     from sdt_tools.config import load_config
     from sdt_tools.error_analysis.analyse import analyse_errors
     from sdt_tools.error_analysis.definitions import ErrorOptions
 
     options = load_config(ErrorOptions, config)
-    with progress_bar("reading scans") as progress:
+    with progress_bar("scans, then neighbours") as progress:
         report = analyse_errors(predictions, recordings, options, out, model, progress)
     if json_output:
         emit({**report.document(), "out": str(out)})

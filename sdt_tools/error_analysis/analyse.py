@@ -35,15 +35,16 @@ def analyse_errors(
     """Tag every labelled frame of ``predictions`` and write the folder ``out``: tags, report, two figures.
 
     ``recordings`` are MCAP files or folders of them, from which the scans are read again; ``model`` is needed where the
-    predictions are of several. Raises UsageError for predictions that cannot be analysed, RecordingError for recordings
-    that are missing or others, OutputExistsError.
+    predictions are of several. ``progress`` hears of recordings read, then of error frames compared. While it works it
+    needs 2.2 kB of disk a frame beside ``out``. Raises UsageError for predictions that cannot be analysed,
+    RecordingError for recordings that are missing or others, OutputExistsError, SdtError without that room.
     """
     if out.exists():
         raise OutputExistsError(out)
     frames = load_labelled(predictions, options, model)
     paths = find_recordings(frames, recordings)
-    scans, incomplete = read_situations(frames, paths, options, progress)
-    explanation = explain(frames, scans, options)
+    scans, incomplete = read_situations(frames, paths, options, progress, scratch=out.parent)
+    explanation = explain(frames, scans, options, progress)
     report = summarise(frames, explanation, options, incomplete)
     inputs = {"predictions": content_hash(predictions), "recordings": {path.stem: content_hash(path) for path in paths}}
     document = {**report.document(), "code_version": code_version(), "inputs": inputs}

@@ -1,8 +1,11 @@
+import errno
 import json
+import os
 import sys
 from dataclasses import dataclass
 from pathlib import Path
 
+import numpy as np
 import polars as pl
 import pytest
 from replay_samples import NearestAhead, label, write_drive
@@ -14,7 +17,7 @@ from sdt_tools.error_analysis.explain import explain
 from sdt_tools.error_analysis.labelled import load_labelled
 from sdt_tools.error_analysis.recorded import find_recordings, read_situations
 from sdt_tools.error_analysis.report.document import ErrorReport, summarise
-from sdt_tools.errors import ConfigError, OutputExistsError, RecordingError, UsageError
+from sdt_tools.errors import ConfigError, OutputExistsError, RecordingError, SdtError, UsageError
 from sdt_tools.replay.replay import replay
 
 sys.path.append(str(Path(__file__).parents[1] / "replay"))
@@ -117,6 +120,44 @@ def test_a_model_without_right_answers_is_systematically_wrong(material: Materia
 def test_an_epsilon_that_leaves_no_neighbours_is_warned_of(material: Material) -> None:
     report = report_of(material.predictions, material, ErrorOptions(epsilon_m=1e-6))
     assert any("no error frame has a neighbour" in warning for warning in report.warnings)
+    assert report.tags[Tag.TRANSIENT].count == 0
+
+
+def test_only_columns_that_are_needed_are_read(material: Material, tmp_path: Path) -> None:
+    predictions = altered(material, tmp_path, wind_mps=pl.lit(1.0), note=pl.lit("dry"))
+    options = ErrorOptions(conditions={"features": ["|wind_mps|", "motion"]})
+    columns = load_labelled(predictions, options).table.columns
+    assert "wind_mps" in columns
+    assert not {"note", "logits", "latency_us"} & set(columns)
+
+
+def test_rows_in_any_order_are_the_same_frames(material: Material, tmp_path: Path) -> None:
+    shuffled = tmp_path / "shuffled.parquet"
+    pl.read_parquet(material.predictions).sample(fraction=1.0, shuffle=True, seed=0).write_parquet(shuffled)
+    sorted_frames, frames = load_labelled(material.predictions, OPTIONS), load_labelled(shuffled, OPTIONS)
+    assert frames.table.equals(sorted_frames.table)
+    assert frames.recording.tolist() == sorted_frames.recording.tolist()
+
+
+def test_scans_in_scratch_are_those_in_memory_and_leave_nothing(material: Material, tmp_path: Path) -> None:
+    frames = load_labelled(material.predictions, OPTIONS)
+    paths = find_recordings(frames, [material.recordings])
+    on_disk, _ = read_situations(frames, paths, OPTIONS, scratch=tmp_path / "room")
+    in_memory, _ = read_situations(frames, paths, OPTIONS)
+    np.testing.assert_array_equal(on_disk, in_memory)
+    assert list((tmp_path / "room").iterdir()) == []
+
+
+def test_a_disk_without_room_for_scans_is_named(
+    material: Material, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def refuse(descriptor: int, offset: int, size: int) -> None:
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+    monkeypatch.setattr(os, "posix_fallocate", refuse)
+    with pytest.raises(SdtError, match=r"no room for .* GB of scans \(No space left on device\); free some"):
+        analyse_errors(material.predictions, [material.recordings], OPTIONS, tmp_path / "errors")
+    assert list(tmp_path.iterdir()) == []
 
 
 def test_unlabelled_predictions_are_refused(material: Material, tmp_path: Path) -> None:

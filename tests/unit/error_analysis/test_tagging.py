@@ -160,3 +160,22 @@ def test_the_order_of_rows_does_not_matter() -> None:
     there = find_conditions(with_errors(rows, wrong.to_numpy()), OPTIONS)
     here = find_conditions(with_errors(mixed, mixed["wrong"].to_numpy()), OPTIONS)
     assert there.verdicts == here.verdicts
+
+
+def test_an_epsilon_that_leaves_no_neighbours_leaves_lone_errors_isolated_and_bursts_unexplained() -> None:
+    rows, scans = drives(13, recordings=4, frames=50)
+    lone, burst = [20, 70, 120], [160, 161, 162]
+    frames = with_errors(rows, np.isin(np.arange(len(rows)), lone + burst))
+    tagged = explain(frames, scans, ErrorOptions(epsilon_m=1e-5)).tagged
+    assert [tagged.tag[frame] for frame in lone] == [Tag.ISOLATED] * 3
+    assert [tagged.tag[frame] for frame in burst] == [Tag.UNEXPLAINED] * 3
+    assert not tagged.transient_by_definition.any()
+
+
+def test_under_an_epsilon_larger_than_everything_only_a_single_error_is_transient() -> None:
+    rows, scans = drives(14, recordings=4, frames=50)
+    for wrong, tag in (([20], Tag.TRANSIENT), ([20, 120], Tag.UNEXPLAINED)):
+        frames = with_errors(rows, np.isin(np.arange(len(rows)), wrong))
+        tagged = explain(frames, scans, ErrorOptions(epsilon_m=100.0)).tagged
+        assert [tagged.tag[frame] for frame in wrong] == [tag] * len(wrong)
+        assert tagged.neighbours[20] == len(rows) - 1
