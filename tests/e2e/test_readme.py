@@ -59,7 +59,7 @@ def workplace(tmp_path: Path) -> Path:
 
 
 def test_the_commands_run_in_the_order_they_are_given(workplace: Path) -> None:
-    assert len(blocks()) == 9
+    assert len(blocks()) == 10
     script = "".join(blocks())
     for said, small in SMALLER.items():
         script = script.replace(said, small)
