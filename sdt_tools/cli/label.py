@@ -53,6 +53,7 @@ def edit(
     Several people may label one recording at once. End with Ctrl-Q; the next time goes on where you left.
     """
     import getpass
+    import signal
     import sys
 
     from sdt_tools.errors import UsageError
@@ -75,12 +76,12 @@ def edit(
     sitting = label_by_hand(task, beside)
     if json_output:
         emit(vars(sitting))
-        return
-    console.print(
-        f"{recording.stem}: {sitting.labelled:,} of {sitting.frames:,} frames have your label, "
-        f"{sitting.labelled - sitting.labelled_before:+,} in this sitting; {sitting.conflicts:,} conflicts are open",
-        soft_wrap=True,
-    )
+    else:
+        new = sitting.labelled - sitting.labelled_before
+        done = f"{sitting.labelled:,} of {sitting.frames:,} frames have your label, {new:+,} in this sitting"
+        console.print(f"{recording.stem}: {done}; {sitting.conflicts:,} conflicts are open", soft_wrap=True)
+    if sitting.terminated:
+        raise typer.Exit(128 + signal.SIGTERM)
 
 
 @app.command("stats")

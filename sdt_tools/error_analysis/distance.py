@@ -6,14 +6,18 @@ Clipped at 2.5 m, what is near (and decides the motion) sets the distance.
 """
 
 from dataclasses import dataclass
+from typing import no_type_check
 
 import numpy as np
 from jaxtyping import Bool, Float, Float32, Float64, Int64
+from numba import njit
 
 from sdt_tools.error_analysis.definitions import ErrorOptions
 from sdt_tools.errors import UsageError
 from sdt_tools.models.preprocess import PreprocessConfig, resolve_codes
+from sdt_tools.runs.blocks import in_blocks
 
+BLOCK_PAIRS = 16_384
 UNRELATED_PAIRS = 5000
 UNRELATED_PERCENTILE = 1.0
 UNRELATED_AFTER_S = 10.0
@@ -36,6 +40,31 @@ def rms_m(
     difference = left.astype(np.float64) - right
     distance_m: Float64[np.ndarray, "pairs"] = np.sqrt(np.mean(difference * difference, axis=1))
     return distance_m
+
+
+def pair_distances_m(
+    scans: Float32[np.ndarray, "frames rays"], left: Int64[np.ndarray, "pairs"], right: Int64[np.ndarray, "pairs"]
+) -> Float64[np.ndarray, "pairs"]:
+    """``rms_m`` between the frames ``left`` and ``right``, pair by pair, for millions of pairs."""
+    distances_m = np.empty(len(left))
+
+    def measure(block: slice) -> None:
+        _rms(scans, left[block], right[block], distances_m[block])
+
+    in_blocks(measure, len(left), BLOCK_PAIRS)
+    return distances_m
+
+
+@njit(cache=True, nogil=True)
+@no_type_check
+def _rms(scans, left, right, distances_m):
+    rays = scans.shape[1]
+    for pair in range(len(left)):
+        square = 0.0
+        for ray in range(rays):
+            difference = np.float64(scans[left[pair], ray]) - np.float64(scans[right[pair], ray])
+            square += difference * difference
+        distances_m[pair] = np.sqrt(square / rays)
 
 
 @dataclass(frozen=True, eq=False)
@@ -70,8 +99,8 @@ def estimate_epsilon(
     """
     follows = follows_closely(recording, stamp_ns, options.max_gap_s)
     later = np.flatnonzero(follows)
-    successive = _distances(scans, later - 1, later)
-    unrelated = _distances(scans, *_unrelated_pairs(recording, stamp_ns, np.random.default_rng(options.seed)))
+    successive = pair_distances_m(scans, later - 1, later)
+    unrelated = pair_distances_m(scans, *_unrelated_pairs(recording, stamp_ns, np.random.default_rng(options.seed)))
     if options.epsilon_m is not None:
         epsilon_m, source = options.epsilon_m, "given"
     elif successive.size == 0:
@@ -96,14 +125,6 @@ def follows_closely(
     follows = np.zeros(len(recording), bool)
     follows[1:] = (np.diff(recording) == 0) & (np.diff(stamp_ns) <= round(max_gap_s * 1e9))
     return follows
-
-
-def _distances(
-    scans: Float32[np.ndarray, "frames rays"], left: Int64[np.ndarray, "pairs"], right: Int64[np.ndarray, "pairs"]
-) -> Float64[np.ndarray, "pairs"]:
-    """Distances of pairs of rows, a few thousand pairs in memory at a time."""
-    blocks = [slice(start, start + 4096) for start in range(0, len(left), 4096)]
-    return np.concatenate([np.empty(0), *(rms_m(scans[left[block]], scans[right[block]]) for block in blocks)])
 
 
 def _unrelated_pairs(

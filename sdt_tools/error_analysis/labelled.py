@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Final
 
 import numpy as np
 import polars as pl
@@ -9,14 +10,18 @@ from jaxtyping import Bool, Float64, Int64
 
 from sdt_tools.error_analysis.definitions import ErrorOptions, is_right, is_wrong
 from sdt_tools.errors import UsageError
-from sdt_tools.replay.predictions import scan_predictions
+from sdt_tools.replay.predictions import SCHEMA, scan_predictions
+
+UNUSED: Final = ("logits", "latency_us")
+"""Columns of predictions that no analysis of errors asks for, the widest among them."""
 
 
 @dataclass(frozen=True, eq=False)
 class LabelledFrames:
     """Frames with their loss, sorted by recording and stamp.
 
-    ``table`` has the columns of predictions without the logits; ``recording`` numbers the recordings from 0 in the
+    ``table`` has the columns of predictions that an analysis may need, so neither logits nor latencies, and of other
+    columns only those that conditions are made of; ``recording`` numbers the recordings from 0 in the
     order of the table, each a contiguous run of rows.
     """
 
@@ -47,7 +52,9 @@ def load_labelled(predictions: Path, options: ErrorOptions, model: str | None = 
     if model is not None and model not in models:
         raise UsageError(f"{predictions}: no predictions of model '{model}'; it holds {', '.join(models)}")
     labelled = rows.filter((pl.col("model") == (model or models[0])) & pl.col("label").is_not_null())
-    table = labelled.drop("logits").collect()
+    asked = [name.strip("|") for name in options.conditions.features]
+    kept = [name for name in rows.collect_schema().names() if name in asked or (name in SCHEMA and name not in UNUSED)]
+    table = labelled.select(kept).collect(engine="streaming")
     if table.is_empty():
         raise UsageError(
             f"{predictions}: none of its frames has a label, so no frame can be called wrong; "
@@ -58,22 +65,35 @@ def load_labelled(predictions: Path, options: ErrorOptions, model: str | None = 
 
 def frames_of(table: pl.DataFrame, options: ErrorOptions, where: str) -> LabelledFrames:
     """``table`` (columns of predictions, one model, all labelled) as frames; ``where`` names it in errors."""
-    table = table.sort("recording", "recording_id", "stamp_ns")
-    twice = table.filter(pl.struct("recording", "recording_id", "stamp_ns").is_duplicated())
-    if not twice.is_empty():
-        stem, stamp_ns = twice.row(0, named=True)["recording"], twice.row(0, named=True)["stamp_ns"]
+    keys = ("recording", "recording_id", "stamp_ns")
+    if not _in_order(table):
+        table = table.sort(keys)
+    starts = table.select(pl.struct("recording", "recording_id").rle_id().cast(pl.Int64)).to_series().to_numpy()
+    stamps_ns = table["stamp_ns"].to_numpy()
+    twice = np.flatnonzero((np.diff(starts) == 0) & (np.diff(stamps_ns) == 0))
+    if twice.size:
+        stem, _, stamp_ns = table.select(keys).row(int(twice[0]))
         raise UsageError(f"{where}: holds the frame of {stem} at {stamp_ns} ns twice; replay each recording once")
     loss = table["loss_01" if options.loss == "zero_one" else "loss_ce"].cast(pl.Float64).to_numpy()
     if not np.isfinite(loss).all():
         raise UsageError(
             f"{where}: {int((~np.isfinite(loss)).sum())} frames have a loss that is not finite; check the model"
         )
-    starts = table.select((pl.struct("recording", "recording_id").rle_id()).cast(pl.Int64)).to_series()
     return LabelledFrames(
         table=table,
-        recording=starts.to_numpy(),
-        stamp_ns=table["stamp_ns"].to_numpy(),
+        recording=starts,
+        stamp_ns=stamps_ns,
         loss=loss,
         wrong=is_wrong(loss, options.eta),
         right=is_right(loss, options.eta),
     )
+
+
+def _in_order(table: pl.DataFrame) -> bool:
+    """Whether rows are sorted by recording and stamp, as they mostly are: sorting takes a second table."""
+    runs = table.select(
+        pl.struct("recording", "recording_id").rle_id().alias("run"), "recording", "recording_id", "stamp_ns"
+    )
+    steps = runs.select(((pl.col("run").diff() == 0) & (pl.col("stamp_ns").diff() < 0)).any()).item()
+    heads = runs.group_by("run", maintain_order=True).first().select("recording", "recording_id")
+    return not steps and heads.equals(heads.sort("recording", "recording_id"))

@@ -9,6 +9,7 @@ from jaxtyping import Float32
 from sdt_tools.error_analysis.definitions import ErrorOptions
 from sdt_tools.error_analysis.distance import situations
 from sdt_tools.error_analysis.labelled import LabelledFrames
+from sdt_tools.error_analysis.scratch import scratch_scans
 from sdt_tools.errors import RecordingError
 from sdt_tools.frames import RAYS
 from sdt_tools.recording.incomplete import Incomplete, incomplete
@@ -39,15 +40,20 @@ def find_recordings(frames: LabelledFrames, places: Sequence[Path]) -> tuple[Pat
 
 
 def read_situations(
-    frames: LabelledFrames, paths: Sequence[Path], options: ErrorOptions, progress: Progress | None = None
+    frames: LabelledFrames,
+    paths: Sequence[Path],
+    options: ErrorOptions,
+    progress: Progress | None = None,
+    scratch: Path | None = None,
 ) -> tuple[Float32[np.ndarray, "frames rays"], tuple[Incomplete, ...]]:
     """The situation of each frame, and the recordings that are cut off or damaged.
 
-    ``paths`` are the recordings in the order of ``frames``.
-
-    Raises RecordingError where a recording cannot be read or lacks the scan of a frame.
+    ``paths`` are the recordings in the order of ``frames``. With ``scratch``, a folder, the situations lie in a
+    nameless file there (``scratch_scans``), else in memory. Raises RecordingError where a recording cannot be read or
+    lacks the scan of a frame.
     """
-    scans = np.empty((len(frames.loss), RAYS), np.float32)
+    total = len(frames.loss)
+    scans = scratch_scans(scratch, total) if scratch else np.empty((total, RAYS), np.float32)
     missing = []
     starts = np.searchsorted(frames.recording, np.arange(len(paths) + 1))
     for number, path in enumerate(paths):

@@ -5,15 +5,20 @@ transient only where its right neighbours make the condition an implausible caus
 """
 
 from dataclasses import dataclass
+from typing import Final
 
 import numpy as np
+import numpy.typing as npt
 import polars as pl
-from jaxtyping import Bool, Float64, Int64
+from jaxtyping import Bool, Float64, Int64, UInt8, UInt32
 
 from sdt_tools.error_analysis.definitions import ErrorOptions, Tag, is_systematic, is_transient
 from sdt_tools.error_analysis.distance import follows_closely
 from sdt_tools.error_analysis.labelled import LabelledFrames
 from sdt_tools.error_analysis.neighbours import NeighbourIndex, count_neighbours
+from sdt_tools.runs.local import Progress
+
+TAGS: Final = tuple(Tag)
 
 
 @dataclass(frozen=True, eq=False)
@@ -30,19 +35,33 @@ class ErrorNeighbours:
 class Tagged:
     """What is said of every frame; neighbour counts are known of error frames only (-1 elsewhere).
 
-    ``transient_by_definition`` is the literal Definition 1, whatever the tag. ``selection`` names the systematic
-    selection that a frame belongs to, empty where there is none.
+    ``code`` is the place of the frame's tag in ``TAGS``. ``transient_by_definition`` is the literal Definition 1,
+    whatever the tag. ``selection_code`` is the place in ``selections`` of the systematic selection that a frame belongs
+    to; the first of them, an empty name, says that there is none.
     """
 
-    tag: tuple[Tag, ...]
+    code: UInt8[np.ndarray, "frames"]
     transient_by_definition: Bool[np.ndarray, "frames"]
     neighbours: Int64[np.ndarray, "frames"]
     right_neighbours: Int64[np.ndarray, "frames"]
-    selection: tuple[str, ...]
+    selection_code: UInt32[np.ndarray, "frames"]
+    selections: tuple[str, ...]
+
+    @property
+    def tag(self) -> npt.NDArray[np.object_]:
+        """The tag of each frame."""
+        tags: npt.NDArray[np.object_] = np.array(TAGS, dtype=object)[self.code]
+        return tags
+
+    @property
+    def selection(self) -> npt.NDArray[np.object_]:
+        """The name of each frame's systematic selection, empty where there is none."""
+        names: npt.NDArray[np.object_] = np.array(self.selections, dtype=object)[self.selection_code]
+        return names
 
     def count(self, tag: Tag) -> int:
         """Frames with ``tag``."""
-        return self.tag.count(tag)
+        return int(np.count_nonzero(self.code == TAGS.index(tag)))
 
 
 def error_neighbours(
@@ -50,11 +69,12 @@ def error_neighbours(
     frames: LabelledFrames,
     inside: Bool[np.ndarray, "conditions frames"],
     epsilon_m: float,
+    progress: Progress | None = None,
 ) -> ErrorNeighbours:
-    """Count the neighbours of each error frame among all frames."""
+    """Count the neighbours of each error frame among all frames; ``progress`` hears of the error frames done."""
     rows = np.flatnonzero(frames.wrong)
     groups = np.vstack([np.ones(len(frames.loss), bool), frames.right, inside])
-    counts = count_neighbours(index, rows, epsilon_m, groups)
+    counts = count_neighbours(index, rows, epsilon_m, groups, progress=progress)
     return ErrorNeighbours(rows, counts[0], counts[1], counts[2:])
 
 
@@ -66,8 +86,7 @@ def tag_errors(
 ) -> Tagged:
     """Tag every frame; ``inside`` holds the frames of each confirmed condition."""
     wrong = frames.wrong
-    selection = systematic_selections(frames, options)
-    systematic = np.array([name != "" for name in selection])
+    selection_code, selections = systematic_selections(frames, options)
     counts = _spread(neighbours.rows, neighbours.all, len(wrong))
     right_counts = _spread(neighbours.rows, neighbours.right, len(wrong))
     literal = is_transient(wrong, counts, right_counts)
@@ -75,12 +94,16 @@ def tag_errors(
     transient = literal & alone if options.guard else literal
     conditional = inside.any(axis=0)
     excused = transient & conditional & implausible_cause(frames, neighbours, inside, options)
-    named = np.select(
-        [~wrong, systematic, conditional & ~excused, transient, (counts == 0) & alone],
-        [Tag.CORRECT, Tag.SYSTEMATIC, Tag.CONDITIONAL, Tag.TRANSIENT, Tag.ISOLATED],
-        default=Tag.UNEXPLAINED,
-    )
-    return Tagged(tuple(Tag(name) for name in named.tolist()), literal, counts, right_counts, selection)
+    code = np.full(len(wrong), TAGS.index(Tag.UNEXPLAINED), np.uint8)
+    for tag, rows in (  # the later ones go first
+        (Tag.ISOLATED, (counts == 0) & alone),
+        (Tag.TRANSIENT, transient),
+        (Tag.CONDITIONAL, conditional & ~excused),
+        (Tag.SYSTEMATIC, selection_code > 0),
+        (Tag.CORRECT, ~wrong),
+    ):
+        code[rows] = TAGS.index(tag)
+    return Tagged(code, literal, counts, right_counts, selection_code, selections)
 
 
 def beside_an_error(frames: LabelledFrames, max_gap_s: float) -> Bool[np.ndarray, "frames"]:
@@ -92,18 +115,34 @@ def beside_an_error(frames: LabelledFrames, max_gap_s: float) -> Bool[np.ndarray
     return beside
 
 
-def systematic_selections(frames: LabelledFrames, options: ErrorOptions) -> tuple[str, ...]:
-    """For each frame the widest selection that is systematically wrong (Definition 2), or an empty name."""
-    names = np.full(len(frames.loss), "", dtype=object)
+def systematic_selections(
+    frames: LabelledFrames, options: ErrorOptions
+) -> tuple[UInt32[np.ndarray, "frames"], tuple[str, ...]]:
+    """The widest selection that each frame belongs to and that is systematically wrong (Definition 2), and their names.
+
+    The first name is empty: no such selection.
+    """
+    codes, names = np.zeros(len(frames.loss), np.uint32), [""]
     for selection in sorted(options.selections, key=("all", "scenario", "recording").index, reverse=True):
-        values = np.zeros(len(names)) if selection == "all" else frames.table[selection].fill_null("").to_numpy()
-        for value in np.unique(values):
-            rows = values == value
-            if value == "" or rows.sum() < options.min_selection_frames:
-                continue
-            if is_systematic(frames.loss[rows], options.eta, options.tau):
-                names[rows] = "all" if selection == "all" else f"{selection} = {value}"
-    return tuple(names.tolist())
+        values = pl.repeat("all", len(codes), eager=True) if selection == "all" else frames.table[selection]
+        found = _systematic_values(values, frames.loss, options)
+        places = {value: place for place, value in enumerate(found, start=len(names))}
+        names += found if selection == "all" else [f"{selection} = {value}" for value in found]
+        if found:
+            here = values.replace_strict(places, default=0, return_dtype=pl.UInt32).to_numpy()
+            codes = np.where(here > 0, here, codes)
+    return codes, tuple(names)
+
+
+def _systematic_values(values: pl.Series, loss: Float64[np.ndarray, "frames"], options: ErrorOptions) -> list[str]:
+    """The values whose frames, enough of them, are systematically wrong."""
+    groups = pl.DataFrame({"value": values, "loss": loss}).drop_nulls("value").filter(pl.col("value") != "")
+    losses = groups.group_by("value").agg(pl.col("loss")).sort("value")
+    return [
+        value
+        for value, one in losses.iter_rows()
+        if len(one) >= options.min_selection_frames and is_systematic(np.array(one), options.eta, options.tau)
+    ]
 
 
 def implausible_cause(
@@ -151,13 +190,16 @@ def tag_columns(tagged: Tagged, errors: Bool[np.ndarray, "frames"]) -> pl.DataFr
     unknown = pl.Series(~errors)
     return pl.DataFrame(
         {
-            "tag": [str(tag) for tag in tagged.tag],
+            "tag": _named(tagged.code, tuple(map(str, TAGS))),
             "definition1_transient": tagged.transient_by_definition,
             "neighbours": tagged.neighbours,
             "right_neighbours": tagged.right_neighbours,
-            "systematic_selection": tagged.selection,
+            "systematic_selection": _named(tagged.selection_code, (None, *tagged.selections[1:])),
         }
-    ).with_columns(
-        pl.when(unknown).then(None).otherwise(pl.col("neighbours", "right_neighbours")).name.keep(),
-        pl.when(pl.col("systematic_selection") != "").then(pl.col("systematic_selection")),
-    )
+    ).with_columns(pl.when(unknown).then(None).otherwise(pl.col("neighbours", "right_neighbours")).name.keep())
+
+
+def _named(
+    codes: UInt8[np.ndarray, "frames"] | UInt32[np.ndarray, "frames"], names: tuple[str | None, ...]
+) -> pl.Series:
+    return pl.Series(names, dtype=pl.String).gather(pl.Series(codes, dtype=pl.UInt32))

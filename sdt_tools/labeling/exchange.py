@@ -20,7 +20,7 @@ from sdt_tools.labeling.frame_labels import rows_of
 from sdt_tools.labeling.journal import Journal, read_journal
 from sdt_tools.labeling.labelled_frames import labelled_frames
 from sdt_tools.labeling.resolve import resolve, standing
-from sdt_tools.labeling.vocabulary import LabelKind, LabelSource, journal_path
+from sdt_tools.labeling.vocabulary import LabelKind, LabelSource, check_labeler, journal_path
 from sdt_tools.recording.reader import Recording
 
 EXPORTED: Final = ("stamp_ns", "time_s", "label", "source", "labeler")
@@ -62,6 +62,7 @@ def import_labels(recording: Path, kind: LabelKind, labels_dir: Path, table: Pat
     has imported already is not repeated. Raises LabelError, naming the line, and writes nothing, for a table that lacks
     a column, a label that is no class, a time or stamp without a frame, or a frame with two labels.
     """
+    check_labeler(labeler)
     with Recording.open(recording) as opened:
         stamps_ns, recording_id = labelled_frames(opened, kind).stamps_ns, opened.recording_id
     given = _read(table, kind)

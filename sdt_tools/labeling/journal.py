@@ -15,7 +15,7 @@ from types import TracebackType
 import polars as pl
 
 from sdt_tools.errors import LabelError
-from sdt_tools.labeling.acts import BROKEN, COLUMNS, HEADER, Acts, parse_acts, parse_journal
+from sdt_tools.labeling.acts import BROKEN, COLUMNS, HEADER, Acts, fault_in, parse_acts, parse_journal
 from sdt_tools.labeling.vocabulary import LabelSource, journal_kind
 
 
@@ -183,6 +183,13 @@ class Journal:
 
     def _check(self, lines: bytes, rows: int, first_line: int) -> None:
         """What is written must read back as the same number of acts."""
+        if rows == 1:  # a person's usual act: the table's rules, without a table
+            text = lines.decode().removesuffix("\n")
+            fault = fault_in(text, journal_kind(self.path), self.recording_id, self._last_act)
+            if fault is not None:
+                raise LabelError(f"{self.path}:{first_line}: {fault}")
+            if text.isprintable() and not text.endswith(BROKEN.decode()):
+                return
         acts = parse_acts(lines, self.path, self.recording_id, first_line, self._last_act)
         if len(acts.table) != rows:
             raise LabelError(f"{self.path}: a labeler's name may not hold line ends; nothing was written")

@@ -39,6 +39,14 @@ _CLASSES: dict[LabelKind, tuple[str, ...]] = {
 }
 
 
+def check_labeler(name: str) -> None:
+    """Raises LabelError for a name that a journal cannot hold."""
+    if not name.strip() or set(name) & set(',"\r\n#') or name.startswith(SETTLED_BY):
+        raise LabelError(
+            f"'{name}': cannot be a labeler's name; use one without commas, quotes, '#' and '{SETTLED_BY}'"
+        )
+
+
 def journal_path(labels_dir: Path, stem: str, kind: LabelKind) -> Path:
     """The journal of the recording whose file name is ``stem`` without its suffix."""
     return labels_dir / f"{stem}.{kind}.csv"

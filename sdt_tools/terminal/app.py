@@ -1,6 +1,9 @@
 """A terminal app that says when its terminal is too small, and works as soon as it is large enough."""
 
+import asyncio
+import signal
 from collections.abc import Iterable
+from contextlib import suppress
 from typing import ClassVar, Generic, TypeVar
 
 from textual import events
@@ -44,6 +47,18 @@ class TerminalApp(App[ResultT], Generic[ResultT]):
     LEAST: ClassVar[tuple[int, int]] = (80, 24)
     ENABLE_COMMAND_PALETTE = False
     BINDINGS: ClassVar[list[BindingType]] = [("ctrl+c", "quit")]
+
+    terminated = False
+    """Whether SIGTERM has ended it; the terminal is given back first."""
+
+    def on_mount(self) -> None:
+        """Listen to SIGTERM."""
+        with suppress(ValueError, RuntimeError):  # not in the main thread: somebody else listens
+            asyncio.get_running_loop().add_signal_handler(signal.SIGTERM, self._terminate)
+
+    def _terminate(self) -> None:
+        self.terminated = True
+        self.exit()
 
     def on_resize(self, event: events.Resize) -> None:
         """Cover the app while the terminal is too small."""

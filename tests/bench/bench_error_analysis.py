@@ -1,10 +1,7 @@
-"""Neighbour search beside other searches over the same frames, and a whole analysis, on one thread."""
-
-import time
+"""Counting neighbours of few frames, and a small analysis; a million frames are in bench_million_frames.py."""
 
 import numpy as np
 import polars as pl
-import pytest
 from pytest_benchmark.fixture import BenchmarkFixture
 
 from sdt_tools.error_analysis.definitions import ErrorOptions
@@ -35,37 +32,6 @@ def drives(recordings: int, frames: int) -> np.ndarray:
 
 def successive_m(scans: np.ndarray) -> float:
     return float(np.percentile(np.sqrt(np.mean(np.diff(scans.astype(np.float64), axis=0) ** 2, axis=1)), 90))
-
-
-def test_neighbours_beside_brute_force(benchmark: BenchmarkFixture) -> None:
-    """Index and search; the same counts as matrix products and, where it is installed, scikit-learn's search."""
-    scans = drives(100, 300)
-    rows = np.random.default_rng(1).choice(len(scans), QUERIES, replace=False)
-    epsilon_m = successive_m(scans)
-    everything = np.ones((1, len(scans)), bool)
-    count_neighbours(build_index(scans[:300]), np.arange(2), epsilon_m, everything[:, :300])  # compiles
-
-    counts = benchmark.pedantic(lambda: count_neighbours(build_index(scans), rows, epsilon_m, everything)[0], rounds=3)
-    started = time.perf_counter()
-    lengths = np.einsum("ij,ij->i", scans, scans, dtype=np.float64)
-    product = scans[rows] @ scans.T
-    near = lengths[rows, None] + lengths[None] - 2.0 * product <= epsilon_m**2 * RAYS
-    by_products = near.sum(axis=1) - 1
-    seconds = {"matrix products": time.perf_counter() - started}
-    assert np.abs(counts - by_products).max() <= 1  # float32 products are not exact at the border
-
-    sklearn_neighbors = pytest.importorskip("sklearn.neighbors")
-    peer = sklearn_neighbors.NearestNeighbors(radius=epsilon_m * np.sqrt(RAYS), algorithm="brute", n_jobs=1).fit(scans)
-    started = time.perf_counter()
-    by_peer = peer.radius_neighbors(scans[rows], return_distance=False)
-    seconds["scikit-learn brute"] = time.perf_counter() - started
-    assert np.abs(counts - np.array([len(found) - 1 for found in by_peer])).max() <= 1
-    if benchmark.stats:
-        ours = benchmark.stats.stats.min
-        benchmark.extra_info["frames"] = len(scans)
-        benchmark.extra_info["neighbours_per_query"] = round(float(counts.mean()), 1)
-        for name, peer_s in seconds.items():
-            benchmark.extra_info[f"times faster than {name}"] = round(peer_s / ours, 1)
 
 
 def test_search_alone(benchmark: BenchmarkFixture) -> None:

@@ -115,6 +115,8 @@ def test_the_end_of_a_terminal_is_the_end_of_the_app_and_nothing_is_lost(
         os.close(terminal.master)
     else:
         terminal.process.send_signal(signal.SIGTERM)
+        assert terminal.end() == 128 + signal.SIGTERM
+        assert terminal.restored
     terminal.process.wait(LONGEST_S)
     assert rows_labelled(tmp_path / "labels" / "drive.motion.csv", "anna") == list(range(10))
 

@@ -19,12 +19,12 @@ from sdt_tools.recording.repair import repair_recording
 from sdt_tools.recording.writer import RecordingWriter
 
 SDT = Path(sys.executable).with_name("sdt")
-ROOM_KB = 2048
+ROOM_KB = 12 << 10
 
 
 @pytest.fixture
 def small_disk(tmp_path: Path) -> Iterator[Path]:
-    """A filesystem of two megabytes with another's file on it; only root can make one."""
+    """A filesystem of twelve megabytes with another's file on it; only root can make one."""
     disk = tmp_path / "disk"
     disk.mkdir()
     command = ["mount", "-t", "tmpfs", "-o", f"size={ROOM_KB}k", "tmpfs", disk]
@@ -57,7 +57,7 @@ def assert_whole(path: Path) -> None:
 
 
 def test_a_recording_that_fills_the_disk(small_disk: Path) -> None:
-    ran = record_beside(small_disk, 1400, "--no-camera", "--seconds", "60")
+    ran = record_beside(small_disk, (10 << 10) + 1400, "--no-camera", "--seconds", "60")
     assert ran.returncode == 2
     said = [line for line in ran.stderr.splitlines() if "r.mcap" in line and "cannot be written after" in line]
     assert len(said) == 1
@@ -66,7 +66,7 @@ def test_a_recording_that_fills_the_disk(small_disk: Path) -> None:
 
 
 def test_in_real_time_a_recording_ends_before_the_disk_is_full(small_disk: Path) -> None:
-    ran = record_beside(small_disk, 1000, "--realtime", "--seconds", "30")
+    ran = record_beside(small_disk, 6 << 10, "--realtime", "--seconds", "30")
     assert ran.returncode == 1
     assert "its disk is nearly full" in " ".join(ran.stderr.split())
     assert_whole(small_disk / "r.mcap")
@@ -76,7 +76,7 @@ def test_a_repair_that_fills_the_disk_leaves_nothing(small_disk: Path, tmp_path:
     path, out = tmp_path / "r.mcap", small_disk / "new.mcap"
     picture = np.random.default_rng(0).bytes(100_000)
     with RecordingWriter(path, SourceInfo("scene", "plain", 0), "") as writer:
-        for number in range(40):
+        for number in range(160):
             stamp_ns = FAST_EPOCH_NS + number
             writer.write(Received(stamp_ns, CameraImage(stamp_ns, picture)))
     with pytest.raises(DiskRefusedError, match="No space left on device"):

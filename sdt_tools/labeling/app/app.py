@@ -34,13 +34,17 @@ class LabelingApp(TerminalApp[None]):
 
 @dataclass(frozen=True)
 class Sitting:
-    """What came of it: ``labelled`` of ``frames`` have the labeler's label now, ``conflicts`` are left."""
+    """What came of it: ``labelled`` of ``frames`` have the labeler's label now, ``conflicts`` are left.
+
+    ``terminated`` by SIGTERM, not by the labeler.
+    """
 
     frames: int
     labelled: int
     labelled_before: int
     conflicts: int
     counts: dict[str, int]
+    terminated: bool = False
 
 
 def label_by_hand(task: Task, beside: Beside | None = None) -> Sitting:
@@ -63,4 +67,5 @@ def label_by_hand(task: Task, beside: Beside | None = None) -> Sitting:
         labelled_before=before,
         conflicts=int(state.labels.disputed.sum()),
         counts=dict(zip(state.classes, state.labels.counts(state.mine), strict=True)),
+        terminated=app.terminated,
     )

@@ -9,7 +9,7 @@ from typing import Protocol, runtime_checkable
 import numpy as np
 import polars as pl
 
-from sdt_tools.errors import LabelError, RecordingError
+from sdt_tools.errors import RecordingError
 from sdt_tools.frames import CameraImage, LidarScan, Received
 from sdt_tools.labeling.app.state import State, Turn, applied, heard
 from sdt_tools.labeling.frame_labels import UNSAID, Speaker, class_numbers, labels_of, rows_of
@@ -19,7 +19,7 @@ from sdt_tools.labeling.labelled_frames import labelled_frames
 from sdt_tools.labeling.predicted import read_predicted
 from sdt_tools.labeling.review import suspects_in
 from sdt_tools.labeling.suspects import read_suspects
-from sdt_tools.labeling.vocabulary import SETTLED_BY, LabelKind, LabelSource, journal_path
+from sdt_tools.labeling.vocabulary import SETTLED_BY, LabelKind, LabelSource, check_labeler, journal_path
 from sdt_tools.recording.frames import Frames
 from sdt_tools.recording.messages.topics import CAMERA_IMAGE, LIDAR_SCAN
 from sdt_tools.recording.reader import Recording
@@ -185,14 +185,6 @@ class Desk:
         numbers = class_numbers(table["label"], self.task.kind).to_numpy()
         predicted[rows[rows >= 0]] = numbers[rows >= 0]
         return predicted
-
-
-def check_labeler(name: str) -> None:
-    """Raises LabelError for a name that a journal cannot hold."""
-    if not name.strip() or set(name) & set(',"\r\n#') or name.startswith(SETTLED_BY):
-        raise LabelError(
-            f"'{name}': cannot be a labeler's name; use one without commas, quotes, '#' and '{SETTLED_BY}'"
-        )
 
 
 def _near(frames: Frames, stamp_ns: int) -> Received | None:

@@ -29,7 +29,7 @@ GROUPS: Final[dict[str, tuple[Key, ...]]] = {
         Key(("end",), "", "last", ""),
         Key(("n",), "n N", "unlabelled", "next unlabelled, previous"),
         Key(("N",), "", "unlabelled_before", ""),
-        Key(("j",), "j J", "disagreement", "next disagreement, previous"),
+        Key(("j",), "j J", "disagreement", "next difference, previous"),
         Key(("J",), "", "disagreement_before", ""),
         Key(("k",), "k K", "suspect", "next suspect, previous"),
         Key(("K",), "", "suspect_before", ""),

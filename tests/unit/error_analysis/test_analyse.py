@@ -1,8 +1,11 @@
+import errno
 import json
+import os
 import sys
 from dataclasses import dataclass
 from pathlib import Path
 
+import numpy as np
 import polars as pl
 import pytest
 from replay_samples import NearestAhead, label, write_drive
@@ -14,7 +17,7 @@ from sdt_tools.error_analysis.explain import explain
 from sdt_tools.error_analysis.labelled import load_labelled
 from sdt_tools.error_analysis.recorded import find_recordings, read_situations
 from sdt_tools.error_analysis.report.document import ErrorReport, summarise
-from sdt_tools.errors import ConfigError, OutputExistsError, RecordingError, UsageError
+from sdt_tools.errors import ConfigError, OutputExistsError, RecordingError, SdtError, UsageError
 from sdt_tools.replay.replay import replay
 
 sys.path.append(str(Path(__file__).parents[1] / "replay"))
@@ -66,7 +69,7 @@ def test_a_model_that_never_stops_fails_where_something_is_near(analysed: tuple[
     document = analysed[0].document()
     assert (document["frames"], document["errors"], document["tags"]["conditional"]) == (200, 70, 70)
     (condition,) = document["conditions"]
-    assert condition["text"] == "front_range_m < 1"
+    assert condition["text"] == "motion = stay"
     assert condition["recordings"] == 5
     assert condition["effect"] == pytest.approx(1.0)
     assert condition["frames"] == condition["errors"] == 70
@@ -74,7 +77,8 @@ def test_a_model_that_never_stops_fails_where_something_is_near(analysed: tuple[
 
 def test_the_folder_holds_tags_report_and_figures(analysed: tuple[ErrorReport, Path], material: Material) -> None:
     _, out = analysed
-    assert sorted(path.name for path in out.iterdir()) == ["epsilon.png", "errors.json", "tags.parquet", "tags.png"]
+    files = ["epsilon.png", "errors.json", "report.html", "tags.parquet", "tags.png"]
+    assert sorted(path.name for path in out.iterdir()) == files
     document = json.loads((out / "errors.json").read_text())
     assert document["options"] == OPTIONS.model_dump(mode="json")
     assert len(document["inputs"]["recordings"]) == 10
@@ -89,7 +93,7 @@ def test_the_folder_holds_tags_report_and_figures(analysed: tuple[ErrorReport, P
 def test_cross_entropy_gives_the_same_errors_under_a_fitting_eta(material: Material) -> None:
     options = ErrorOptions(loss="cross_entropy", eta=1.5)
     report = report_of(material.predictions, material, options)
-    assert [condition.verdict.condition.text for condition in report.conditions] == ["front_range_m < 1"]
+    assert [condition.verdict.condition.text for condition in report.conditions] == ["motion = stay"]
 
 
 def test_one_recording_is_analysed_without_conditions(material: Material, tmp_path: Path) -> None:
@@ -117,6 +121,44 @@ def test_a_model_without_right_answers_is_systematically_wrong(material: Materia
 def test_an_epsilon_that_leaves_no_neighbours_is_warned_of(material: Material) -> None:
     report = report_of(material.predictions, material, ErrorOptions(epsilon_m=1e-6))
     assert any("no error frame has a neighbour" in warning for warning in report.warnings)
+    assert report.tags[Tag.TRANSIENT].count == 0
+
+
+def test_only_columns_that_are_needed_are_read(material: Material, tmp_path: Path) -> None:
+    predictions = altered(material, tmp_path, wind_mps=pl.lit(1.0), note=pl.lit("dry"))
+    options = ErrorOptions(conditions={"features": ["|wind_mps|", "motion"]})
+    columns = load_labelled(predictions, options).table.columns
+    assert "wind_mps" in columns
+    assert not {"note", "logits", "latency_us"} & set(columns)
+
+
+def test_rows_in_any_order_are_the_same_frames(material: Material, tmp_path: Path) -> None:
+    shuffled = tmp_path / "shuffled.parquet"
+    pl.read_parquet(material.predictions).sample(fraction=1.0, shuffle=True, seed=0).write_parquet(shuffled)
+    sorted_frames, frames = load_labelled(material.predictions, OPTIONS), load_labelled(shuffled, OPTIONS)
+    assert frames.table.equals(sorted_frames.table)
+    assert frames.recording.tolist() == sorted_frames.recording.tolist()
+
+
+def test_scans_in_scratch_are_those_in_memory_and_leave_nothing(material: Material, tmp_path: Path) -> None:
+    frames = load_labelled(material.predictions, OPTIONS)
+    paths = find_recordings(frames, [material.recordings])
+    on_disk, _ = read_situations(frames, paths, OPTIONS, scratch=tmp_path / "room")
+    in_memory, _ = read_situations(frames, paths, OPTIONS)
+    np.testing.assert_array_equal(on_disk, in_memory)
+    assert list((tmp_path / "room").iterdir()) == []
+
+
+def test_a_disk_without_room_for_scans_is_named(
+    material: Material, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def refuse(descriptor: int, offset: int, size: int) -> None:
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+    monkeypatch.setattr(os, "posix_fallocate", refuse)
+    with pytest.raises(SdtError, match=r"no room for .* GB of scans \(No space left on device\); free some"):
+        analyse_errors(material.predictions, [material.recordings], OPTIONS, tmp_path / "errors")
+    assert list(tmp_path.iterdir()) == []
 
 
 def test_unlabelled_predictions_are_refused(material: Material, tmp_path: Path) -> None:
@@ -191,7 +233,7 @@ def test_the_verb_shows_tags_and_conditions(
     arguments = ("--recordings", material.recordings, "--out", tmp_path / "errors")
     assert run(monkeypatch, "errors", material.predictions, *arguments) == 0
     shown = capsys.readouterr().err
-    assert "front_range_m < 1" in shown
+    assert "motion = stay" in shown
     assert "conditional" in shown
 
 

@@ -4,7 +4,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from sdt_tools.error_analysis.definitions import ErrorOptions
-from sdt_tools.error_analysis.distance import estimate_epsilon, follows_closely, rms_m, situations
+from sdt_tools.error_analysis.distance import estimate_epsilon, follows_closely, pair_distances_m, rms_m, situations
 from sdt_tools.errors import UsageError
 
 SECOND_NS = 1_000_000_000
@@ -85,3 +85,10 @@ def test_lone_frames_cannot_give_epsilon() -> None:
 def test_copies_cannot_give_epsilon() -> None:
     with pytest.raises(UsageError, match="exact copies"):
         estimate_epsilon(*straight_drives([0.0] * 5), OPTIONS)
+
+
+def test_distances_of_many_pairs_are_those_of_each() -> None:
+    rng = np.random.default_rng(3)
+    scans = rng.random((50, 541), np.float32)
+    left, right = rng.integers(50, size=(2, 40_000))  # more than a block
+    np.testing.assert_allclose(pair_distances_m(scans, left, right), rms_m(scans[left], scans[right]), rtol=1e-12)

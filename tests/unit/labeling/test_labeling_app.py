@@ -15,13 +15,13 @@ from textual.widgets import Static
 from sdt_tools.errors import LabelError, RecordingError, RunError
 from sdt_tools.frames import Received
 from sdt_tools.labeling.app.app import LabelingApp
-from sdt_tools.labeling.app.desk import Desk, Task, check_labeler
+from sdt_tools.labeling.app.desk import Desk, Task
 from sdt_tools.labeling.app.dialogs import HelpDialog, ReviewDialog, place_of
 from sdt_tools.labeling.app.keys import ACTIONS, class_keys
 from sdt_tools.labeling.app.screen import LabelingScreen
 from sdt_tools.labeling.frame_labels import UNSAID
 from sdt_tools.labeling.journal import read_journal
-from sdt_tools.labeling.vocabulary import LabelKind, LabelSource
+from sdt_tools.labeling.vocabulary import LabelKind, LabelSource, check_labeler
 from sdt_tools.terminal.app import TooSmall
 from sdt_tools.terminal.picture_view import PictureView
 from sdt_tools.terminal.scan_view import ScanView

@@ -1,0 +1,1 @@
+"""The paper's claims held against predictions: each supported, contradicted or undecided, with its numbers."""
