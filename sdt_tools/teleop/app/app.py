@@ -37,6 +37,9 @@ class CockpitApp(TerminalApp[None]):
         self.push_screen(self._seat)
         self.set_interval(SHOW_S, self._look)
 
+    def listen_to_signals(self) -> None:
+        """Leave them to ``deferred_interrupt``, which does not wait for the screen."""
+
     def on_key(self, event: events.Key) -> None:
         """Space stops too while the terminal is too small to show anything."""
         if event.key == "space":

@@ -62,7 +62,9 @@ class NoteDialog(ModalScreen[str]):
         """A line to type in."""
         with Vertical():
             yield Static(f"{self._mark} is set. A note on it? Enter ends it · Esc is the emergency stop", markup=False)
-            yield Input(id="note", max_length=200)
+            note = Input(id="note", max_length=200)
+            note.cursor_blink = False
+            yield note
 
     @on(Input.Submitted)
     def give(self, event: Input.Submitted) -> None:

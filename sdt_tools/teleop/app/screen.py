@@ -90,9 +90,12 @@ class CockpitScreen(Screen[None]):
         if action is not None:
             event.stop()
             await self.run_action(action)
+            self.show()
 
     def show(self) -> None:
         """Show the newest of everything."""
+        if not self.is_mounted:
+            return
         cockpit, view, width = self._cockpit, self._cockpit.watch.view(), self.size.width
         if not width:
             return
