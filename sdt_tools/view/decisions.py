@@ -87,12 +87,14 @@ def models_of(
     the same key and tag, and the others too where a model is known from them alone. Rows of other recordings are passed
     over. Where predictions were made without labels, ``labels`` take their place; the loss stays unknown.
 
-    Raises UsageError where all predictions are about other recordings, and for an unknown tag.
+    Raises UsageError where all predictions, or all tags, are about other recordings, and for an unknown tag.
     """
     ours = [_answers(frame, recording_id) for frame in predictions]
     rows = pl.concat(ours or [_NO_ANSWERS])
     if predictions and rows.is_empty():
-        raise UsageError(_nothing_about(recording_id, predictions))
+        raise UsageError(_nothing_about(recording_id, predictions, "predictions", "replay the model over"))
+    if tags and not any((frame["recording_id"] == recording_id).any() for frame in tags):
+        raise UsageError(_nothing_about(recording_id, tags, "tags", "analyse the errors of"))
     told = [_answers(frame, recording_id) for frame in tags if set(_ANSWERS) <= set(frame.columns)]
     rows = pl.concat([rows, pl.concat(told or [_NO_ANSWERS]).join(rows, on="model", how="anti")])
     if rows.is_empty():
@@ -113,14 +115,12 @@ def _answers(frame: pl.DataFrame, recording_id: str) -> pl.DataFrame:
     return ours.select(pl.col(name).cast(dtype) for name, dtype in _ANSWERS.items())
 
 
-def _nothing_about(recording_id: str, predictions: Sequence[pl.DataFrame]) -> str:
-    others = (
-        pl.concat([frame.select("recording_id") for frame in predictions])["recording_id"].unique().sort().to_list()
-    )
+def _nothing_about(recording_id: str, given: Sequence[pl.DataFrame], what: str, remedy: str) -> str:
+    others = pl.concat([frame.select("recording_id") for frame in given])["recording_id"].unique().sort().to_list()
     named = ", ".join(others[:3]) + (" …" if len(others) > 3 else "")
     return (
-        f"none of the predictions is about recording {recording_id}; they are about {named or 'nothing'}: "
-        "replay the model over this recording first"
+        f"none of the {what} is about recording {recording_id}; they are about {named or 'nothing'}: "
+        f"{remedy} this recording first"
     )
 
 

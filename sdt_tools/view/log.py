@@ -78,8 +78,8 @@ def write_rrd(
     without, all errors can, and it begins with the recording. ``every`` shows one scan in so many; ``motions`` shapes
     the arrows.
 
-    Raises OutputExistsError; UsageError for ``every`` below 1 and for predictions of which none is about ``recording``;
-    RecordingError where there is nothing to read; RunError where the disk does not take it all.
+    Raises OutputExistsError; UsageError for ``every`` below 1 and for predictions or tags of which none is about
+    ``recording``; RecordingError where there is nothing to read; RunError where the disk does not take it all.
     """
     began = time.perf_counter()
     if every < 1:

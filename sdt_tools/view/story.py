@@ -71,7 +71,7 @@ def gather_story(
     """Gather what ``source`` says, and what ``labels``, ``predictions`` and ``tags`` say of it.
 
     Errors with one of the tags ``step_tags`` (all without) can be stepped through. Raises UsageError where predictions
-    are given and none of them is about ``source``, and for the name of no tag.
+    or tags are given and none of them is about ``source``, and for the name of no tag.
     """
     check_tags(step_tags)
     wanted = step_tags or ERROR_TAGS

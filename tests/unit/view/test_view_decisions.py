@@ -50,6 +50,11 @@ def test_predictions_of_other_recordings_only_are_refused() -> None:
         models_of("a", [predictions("b")], [], NO_LABELS)
 
 
+def test_tags_of_other_recordings_only_are_refused() -> None:
+    with pytest.raises(UsageError, match=r"none of the tags is about recording a; they are about b: analyse"):
+        models_of("a", [predictions("a")], [tags("b", "transient")], NO_LABELS)
+
+
 def test_an_unknown_tag_is_named() -> None:
     with pytest.raises(UsageError, match="unknown error tag 'sporadic'; it is one of unlabeled, correct"):
         models_of("a", [predictions("a")], [tags("a", "sporadic")], NO_LABELS)
