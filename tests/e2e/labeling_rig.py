@@ -93,6 +93,14 @@ class LabelingTerminal:
         fcntl.ioctl(self.slave, termios.TIOCSWINSZ, struct.pack("HHHH", lines, columns, 0, 0))
         self.process.send_signal(signal.SIGWINCH)
 
+    def insist(self, columns: int, lines: int, words: str) -> None:
+        """Resize until ``words`` are shown: a busy app may be told of a size before it listens."""
+        end_s = time.monotonic() + LONGEST_S
+        while words not in self.look():
+            assert time.monotonic() < end_s, f"'{words}' is not shown"
+            self.resize(columns, lines)
+            time.sleep(0.5)
+
     def end(self) -> int:
         end_s = time.monotonic() + LONGEST_S
         while self.process.poll() is None:

@@ -6,8 +6,10 @@ from contextlib import ExitStack
 from heapq import merge
 from itertools import groupby
 from pathlib import Path
+from typing import Final
 from zlib import crc32
 
+from sdt_tools.errors import RecordingError
 from sdt_tools.recording.container.reader import McapReader, RawEntry
 from sdt_tools.recording.copying import RecordCopy, new_file
 from sdt_tools.recording.editing.latched import Carried, carried_in, latched_topics, place_of
@@ -15,9 +17,12 @@ from sdt_tools.recording.editing.pauses import pauses_between, recorded, spans_o
 from sdt_tools.recording.editing.plan import Merge
 from sdt_tools.recording.editing.provenance import EditedRecording, original, write_beginning, write_end
 from sdt_tools.recording.editing.span import Span, whole_span
+from sdt_tools.recording.messages.topics import CAMERA_IMAGE, LIDAR_SCAN
 from sdt_tools.recording.reader import recording_id_of
 from sdt_tools.recording.session import derived_id
 
+_SENSORS: Final = (LIDAR_SCAN, CAMERA_IMAGE)
+"""Topics whose stamps labels go by."""
 _Numbered = tuple[int, RawEntry]
 """A message and the place of its recording among those that are merged."""
 
@@ -27,7 +32,7 @@ def write_merged(plan: Merge, path: Path) -> EditedRecording:
 
     A message that several hold (same topic, times and data: their parts overlap) is written once. So is one that was
     carried to the beginning of a part and stands in another original where it belongs. Messages of one moment keep the
-    order of the originals.
+    order of the originals. Raises RecordingError for originals that saw different things at one moment.
     """
     with ExitStack() as stack:
         sources = [stack.enter_context(McapReader(original)) for original in plan.originals]
@@ -46,6 +51,7 @@ def write_merged(plan: Merge, path: Path) -> EditedRecording:
             for _, moment in groupby(merge(*streams, key=_log_ns), key=_log_ns):
                 found = list(moment)
                 once = list(_union(sources, found))
+                _check_kinship(plan, sources, once)
                 shared += len(found) - len(once)
                 for place, entry in once:
                     copy.take(sources[place], entry)
@@ -103,6 +109,25 @@ def _union(sources: Sequence[McapReader], moment: Sequence[_Numbered]) -> Iterat
             if met[message] > written[message]:
                 written[message] += 1
                 yield place, entry
+
+
+def _check_kinship(plan: Merge, sources: Sequence[McapReader], moment: Sequence[_Numbered]) -> None:
+    """Refuse recordings that saw different things at one moment: a label's stamp would mean both.
+
+    Raises RecordingError, naming the two.
+    """
+    seen: dict[tuple[str, int], tuple[int, bytes]] = {}
+    for place, entry in moment:
+        topic = sources[place].channels[entry.channel_id].topic
+        if topic not in _SENSORS:
+            continue
+        before, data = seen.setdefault((topic, entry.publish_ns), (place, entry.data))
+        if before != place and data != entry.data:
+            raise RecordingError(
+                f"{plan.originals[before]} and {plan.originals[place]}: both hold a message of {topic} taken at "
+                f"{entry.publish_ns} ns, but not the same: these are different drives, which cannot be told apart in "
+                "one recording; keep them as two"
+            )
 
 
 def _needless(sources: Sequence[McapReader], carried: Sequence[frozenset[Carried]]) -> list[frozenset[Carried]]:

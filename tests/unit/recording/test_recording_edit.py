@@ -2,6 +2,7 @@ import json
 import resource
 import signal
 import tracemalloc
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -105,6 +106,15 @@ def test_recordings_that_overlap_are_interleaved(tmp_path: Path) -> None:
         stamps = [m.received_ns for m in new.messages()]
     assert stamps == sorted(stamps)
     assert told(tmp_path / "new.mcap") == sorted(told(tmp_path / "a.mcap") + told(tmp_path / "b.mcap"))
+
+
+def test_different_drives_of_the_same_moments_are_not_one(tmp_path: Path) -> None:
+    for name, first in (("a", 0), ("b", 1)):
+        drive = [Received(T0 + n, replace(scan(n + first).message, stamp_ns=T0 + n)) for n in range(5)]
+        write(tmp_path / f"{name}.mcap", drive, recording_id=name)
+    with pytest.raises(RecordingError, match="different drives"):
+        edit_recordings(plan_merge([tmp_path / "a.mcap", tmp_path / "b.mcap"], tmp_path / "new.mcap"))
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["a.mcap", "b.mcap"]
 
 
 def test_a_carried_message_stays_where_its_original_is_not(tmp_path: Path) -> None:
