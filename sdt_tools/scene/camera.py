@@ -15,8 +15,8 @@ from sdt_tools.scene.rendering.mesh import join
 from sdt_tools.scene.rendering.person import draw_person
 from sdt_tools.scene.rendering.photometry import take_picture
 from sdt_tools.scene.rendering.posture import posture_of
-from sdt_tools.scene.rendering.props import HANDY, build_props
 from sdt_tools.scene.rendering.projection import CameraMount, Pinhole, view_from
+from sdt_tools.scene.rendering.props import HANDY, build_props
 from sdt_tools.scene.rendering.raster import draw
 from sdt_tools.scene.rendering.room import build_room
 from sdt_tools.scene.rendering.texture import TextureBank
@@ -78,7 +78,8 @@ class SceneCamera:
         """The picture (blue, green, red) from a robot whose centre is at ``robot``.
 
         ``gait_phase`` in radians and ``gait_amplitude`` (0 to 1) are the walker's; ``gesture_phase`` runs from 0, arms
-        down, to 1, gesture or behaviour made, in its ``manner``; ``time_s`` is for the small movements of one who stands; ``frame`` for the noise.
+        down, to 1, gesture or behaviour made, in its ``manner``; ``time_s`` is for the small movements of one who
+        stands; ``frame`` for the noise.
         """
         self._draw(robot, operator, gait_phase, gait_amplitude, gesture, gesture_phase, time_s, manner)
         return take_picture(self._radiance, self._light.kind, (self._seed * _FRAMES + frame) % 2**63)

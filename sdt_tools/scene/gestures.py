@@ -25,9 +25,7 @@ def arms_at(gestures: Sequence[GestureEvent], behaviours: Sequence[BehaviourEven
     return arms if arms.makes is not Gesture.IDLE and arms.share > 0.0 else _arms_in(behaviours, time_s, arms)
 
 
-def _arms_in(
-    events: Sequence[GestureEvent] | Sequence[BehaviourEvent], time_s: float, otherwise: Arms = ARMS_AT_REST
-) -> Arms:
+def _arms_in(events: Sequence[GestureEvent | BehaviourEvent], time_s: float, otherwise: Arms = ARMS_AT_REST) -> Arms:
     for event in reversed(events):
         begun_s = time_s - event.at_s + event.lead_s
         if begun_s >= 0.0:

@@ -301,7 +301,10 @@ def draw(scenario: Scenario, seed: int) -> Layout:
         light=scenario.light,
         behaviours=tuple(
             sorted(
-                (BehaviourEvent(spec.at_s.draw(rng), spec.does, spec.lasts_s.draw(rng)) for spec in scenario.behaviours),
+                (
+                    BehaviourEvent(spec.at_s.draw(rng), spec.does, spec.lasts_s.draw(rng))
+                    for spec in scenario.behaviours
+                ),
                 key=lambda event: event.at_s,
             )
         ),

@@ -151,11 +151,7 @@ class SceneSource:
         """His gesture and what he has asked for, when one of them changes and once a second."""
         world, old = self.world, self._state
         state = world.operator_state(now_ns, world.time_s)
-        if (
-            old is None
-            or replace(old, stamp_ns=now_ns) != state
-            or now_ns - old.stamp_ns >= SECOND_NS
-        ):
+        if old is None or replace(old, stamp_ns=now_ns) != state or now_ns - old.stamp_ns >= SECOND_NS:
             self._state = state
             yield state
 

@@ -1,6 +1,6 @@
 """What hands do that is no gesture: scratching, a phone, pointing, carrying; where they are, and the head with them.
 
-Places are shares of the person's height in the chest's axes (x ahead, y out to the arm's own side, z up from the floor).
+Places are shares of the person's height in the chest's axes (x ahead, y out to the arm's side, z up from the floor).
 """
 
 import math

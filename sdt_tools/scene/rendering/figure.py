@@ -28,9 +28,7 @@ class Figure:
         self.joints = rest_joints(person)
         self._skin = build_body(person, self.joints, paint_person(person, bank, rng))
 
-    def stand(
-        self, posture: Posture, place: Pose2D, light: Light, holding: Skin | None = None
-    ) -> tuple[Mesh, Mesh]:
+    def stand(self, posture: Posture, place: Pose2D, light: Light, holding: Skin | None = None) -> tuple[Mesh, Mesh]:
         """The lit figure in ``posture`` at ``place``, with what he is ``holding``; and the shade under it."""
         bones = pose_bones(self.joints, posture, place)
         skin = self._skin if holding is None else join_skins([self._skin, holding])
