@@ -16,12 +16,10 @@ _AROUND: Final = 22
 _WHOLE: Final = np.array([0.0, 1.0])
 
 
-def build_skyline(
-    bounds_m: Float64[np.ndarray, "4"], light: Light, bank: TextureBank, rng: np.random.Generator
-) -> Mesh:
-    """A ring of fronts around ``bounds_m``, each a hedge, a row of trees or a house, with gaps of open sky."""
-    middle = (bounds_m[:2] + bounds_m[2:]) / 2
-    radius_m = float(np.linalg.norm(bounds_m[2:] - bounds_m[:2])) / 2 + rng.uniform(9.0, 18.0)
+def build_skyline(area_m: Float64[np.ndarray, "4"], light: Light, bank: TextureBank, rng: np.random.Generator) -> Mesh:
+    """A ring of fronts around ``area_m``, each a hedge, a row of trees or a house, with gaps of open sky."""
+    middle = (area_m[:2] + area_m[2:]) / 2
+    radius_m = float(np.linalg.norm(area_m[2:] - area_m[:2])) / 2 + rng.uniform(9.0, 18.0)
     house, green = bank.add(_house(rng)), bank.add(_leaves(rng))
     fronts = []
     for place in range(_AROUND):
