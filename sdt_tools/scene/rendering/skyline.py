@@ -38,7 +38,9 @@ def build_skyline(area_m: Float64[np.ndarray, "4"], light: Light, bank: TextureB
             vector(0.0, 0.0, height),
             _WHOLE,
             _WHOLE,
-            (round(width / 5.0) or 1.0, max(1.0, round(height / 5.0))) if kind == 0 else (width / 3.0, height / 3.0),
+            (max(1.0, float(round(width / 5.0))), max(1.0, float(round(height / 5.0))))
+            if kind == 0
+            else (width / 3.0, height / 3.0),
             house if kind == 0 else green,
         )
         facing = np.tile([-float(out[0]), -float(out[1]), 0.3], (len(front.points_m), 1))
