@@ -36,10 +36,9 @@ def film(folder: Path, seed: int, count: int = 45, broken: Sequence[int] = (), s
     with RecordingWriter(path, SourceInfo(source, "", seed), "") as writer:
         for number in range(count):
             data = picture(seed, number)
+            data = data[: len(data) // 2] if number in broken else data
             stamp_ns = START_NS + number * PERIOD_NS
-            writer.write(
-                Received(stamp_ns, CameraImage(stamp_ns, data[: len(data) // 2] if number in broken else data))
-            )
+            writer.write(Received(stamp_ns, CameraImage(stamp_ns, data)))
     with Recording.open(path) as opened:
         recording_id = opened.recording_id
     rows = [(START_NS + number * PERIOD_NS, CLASSES[(seed + number // 10) % 3]) for number in range(count)]
