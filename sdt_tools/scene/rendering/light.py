@@ -104,7 +104,8 @@ class Light:
                 return sky + self.power * direct
             # A wall's two sides stand on one line: what faces inwards is inside.
             share = self.roof.daylight(points_m + 0.02 * normals)
-            return sky * share + self.power * direct * (share >= 1.0)
+            lit: Float64[np.ndarray, "points"] = sky * share + self.power * direct * (share >= 1.0)
+            return lit
         for lamp in self.lamps_m:
             way = lamp - points_m
             square = np.maximum((way**2).sum(axis=1), 0.25)
@@ -133,7 +134,8 @@ def roof_over(walls: Sequence[Wall]) -> Roof:
     def is_open(axis: int, at: float) -> bool:
         low, high = (x0, x1) if axis == 1 else (y0, y1)
         along = ends[np.all(np.abs(ends[:, :, axis] - at) < 0.1, axis=1)][:, :, 1 - axis]
-        return float(np.abs(along[:, 1] - along[:, 0]).sum()) < 0.6 * (high - low)
+        closed_m = float(np.abs(along[:, 1] - along[:, 0]).sum())
+        return closed_m < 0.6 * float(high - low)
 
     return Roof((x0, y0, x1, y1), (is_open(0, x0), is_open(1, y0), is_open(0, x1), is_open(1, y1)))
 
