@@ -73,8 +73,9 @@ def follow(
         TimeRemainingColumn,
     )
 
-    from sdt_tools.training.follow import train_follow, unfinished
+    from sdt_tools.training.follow import train_follow
     from sdt_tools.training.record import EpochRecord
+    from sdt_tools.training.snapshot import unfinished
 
     asked = {
         "arch": arch,

@@ -1,0 +1,48 @@
+"""The learning curve of a vision network, as a picture."""
+
+import io
+from collections.abc import Sequence
+from typing import Final
+
+from matplotlib.figure import Figure
+from matplotlib.ticker import MaxNLocator, PercentFormatter
+
+from sdt_tools.training.vision.loop import VisionEpoch
+
+_TRAIN: Final = "#8a8f98"
+_VAL: Final = "#1f6feb"
+_ATTACKED: Final = "#f3d5d8"
+
+
+def vision_curve_png(history: Sequence[VisionEpoch], title: str) -> bytes:
+    """Loss and accuracy over the epochs; those in which images were attacked are shaded."""
+    figure = Figure(figsize=(9.0, 3.6), layout="constrained")
+    loss, accuracy = figure.subplots(1, 2)
+    epochs = [record.epoch for record in history]
+    for axes, train, val, what in (
+        (loss, [one.train_loss for one in history], [one.val_loss for one in history], "cross-entropy"),
+        (accuracy, [one.train_accuracy for one in history], [one.val_accuracy for one in history], "accuracy"),
+    ):
+        for record in history:
+            if record.epsilon:
+                axes.axvspan(record.epoch - 0.5, record.epoch + 0.5, color=_ATTACKED, linewidth=0)
+        axes.plot(epochs, train, color=_TRAIN, marker=".", label="training, as varied and attacked")
+        axes.plot(epochs, val, color=_VAL, marker=".", label="validation, clean")
+        axes.set(title=what, xlabel="epoch")
+        axes.set_ylim(bottom=0.0)
+        axes.xaxis.set_major_locator(MaxNLocator(integer=True))
+        axes.grid(alpha=0.25)
+        axes.spines[["top", "right"]].set_visible(False)
+    accuracy.set_ylim(0.0, 1.02)
+    accuracy.yaxis.set_major_formatter(PercentFormatter(1.0, decimals=0))
+    loss.legend(loc="upper right", frameon=False)
+    accuracy.legend(
+        [f"training: {history[-1].train_accuracy:.1%}", f"validation: {history[-1].val_accuracy:.1%}"],
+        handles=accuracy.get_lines(),
+        loc="lower right",
+        frameon=False,
+    )
+    figure.suptitle(title)
+    picture = io.BytesIO()
+    figure.savefig(picture, format="png", dpi=120)
+    return picture.getvalue()
