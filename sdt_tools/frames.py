@@ -230,11 +230,15 @@ class MotionCommand:
 
 @dataclass(frozen=True)
 class OperatorState:
-    """The gesture that the operator makes and the mode he has asked for; known in the scene only."""
+    """The gesture that the operator makes and the mode he has asked for; known in the scene only.
+
+    ``behaviour`` names what else his hands do (a phone call, pointing): it may look like a gesture, and is none.
+    """
 
     stamp_ns: int
     gesture: Gesture
     commanded_mode: Mode
+    behaviour: str = ""
 
 
 @dataclass(frozen=True)

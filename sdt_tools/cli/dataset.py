@@ -27,7 +27,10 @@ def build(
         typer.Option(metavar="REC", help="A recording to validate with, in place of a share of REC...; repeatable."),
     ] = None,
     config: Annotated[Path | None, typer.Option(help="TOML file; the options below go before it.")] = None,
-    labels: Annotated[Path, typer.Option(help="Folder of the journals, <recording>.motion.csv.")] = Path("labels"),
+    kind: Annotated[
+        str | None, typer.Option(help="motion, labels of scans, or gesture, labels of pictures. [motion]")
+    ] = None,
+    labels: Annotated[Path, typer.Option(help="Folder of the journals, <recording>.<kind>.csv.")] = Path("labels"),
     train_frames: Annotated[int | None, typer.Option(help="Training frames in all; without, as many as fit.")] = None,
     val_frames: Annotated[int | None, typer.Option(help="Validation frames in all; without, as many as fit.")] = None,
     val_share: Annotated[float | None, typer.Option(help="Share of the recordings kept for validation. [0.2]")] = None,
@@ -36,7 +39,7 @@ def build(
     ] = None,
     per_recording_cap: Annotated[int | None, typer.Option(help="At most so many frames of one recording. [40]")] = None,
     spacing_s: Annotated[float | None, typer.Option(help="Least time between frames of one recording. [0.4]")] = None,
-    tolerance_ms: Annotated[float | None, typer.Option(help="Most time between a label and its scan. [10]")] = None,
+    tolerance_ms: Annotated[float | None, typer.Option(help="Most time between a label and its frame. [10]")] = None,
     seed: Annotated[int | None, typer.Option(help="Chooses the recordings that validate, and frames. [0]")] = None,
     conflict_level: Annotated[
         int | None, typer.Option(help="Level of the safety domains that labels must not contradict, 0 for none. [3]")
@@ -47,7 +50,10 @@ def build(
     ] = None,
     json_output: JsonFlag = False,
 ) -> None:
-    """Join scans with labels, choose frames by the rules, split them by recording, and write them with a manifest."""
+    """Join scans or pictures with labels, choose frames by the rules, split them by recording, write them down.
+
+    A manifest beside the frames says what they were made from. Pictures that no decoder reads are left out and named.
+    """
     from sdt_tools.cli.progress import progress_bar
     from sdt_tools.config import parse_config, read_toml
     from sdt_tools.dataset.build import build_dataset
@@ -56,6 +62,7 @@ def build(
     from sdt_tools.robustness.conflicts import conflict_check
 
     options = {
+        "kind": kind,
         "train_frames": train_frames,
         "val_frames": val_frames,
         "val_share": val_share,
@@ -96,6 +103,7 @@ def _document(summary: "DatasetSummary") -> dict[str, object]:
         "counts": summary.counts,
         "conflicts": summary.conflicts,
         "unmatched_labels": summary.unmatched_labels,
+        "unreadable_pictures": {name: list(stamps_ns) for name, stamps_ns in summary.unreadable.items()},
         "disputed_stamps": summary.disputed_stamps,
         "broken_lines": summary.broken_lines,
         "truncated": any(recording.truncated for recording in summary.incomplete),
@@ -113,7 +121,10 @@ def _show(summary: "DatasetSummary") -> None:
     console.print(table)
     notes = {
         "frames in a safety domain with a label that it forbids, listed in the manifest": summary.conflicts,
-        "labels without a scan near enough": summary.unmatched_labels,
+        "labels without a scan or readable picture near enough": summary.unmatched_labels,
+        "pictures that no decoder reads, left out and named in the manifest": sum(
+            map(len, summary.unreadable.values())
+        ),
         "stamps left out because humans disagree": summary.disputed_stamps,
         "broken lines in journals, which count for nothing": summary.broken_lines,
     }

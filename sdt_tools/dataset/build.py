@@ -1,7 +1,7 @@
 """Recordings and their journals, made into a data set.
 
-Labels decide first which frames are taken; then the scans of those are read, recording by recording, so that memory
-holds stamps and one row group of frames, never a whole recording.
+Labels decide first which frames are taken; then the scans or pictures of those are read, recording by recording, so
+that memory holds stamps and one row group of frames, never a whole recording.
 """
 
 import os
@@ -18,8 +18,17 @@ from jaxtyping import Bool, Float64, Int64
 
 from sdt_tools.dataset.candidates import SCANS_A_BATCH, LabelledRecording, read_labelled
 from sdt_tools.dataset.config import DatasetConfig
-from sdt_tools.dataset.frames_file import FRAMES_FILE, FrameBlock, FramesWriter
+from sdt_tools.dataset.frames_file import (
+    FRAMES_FILE,
+    PICTURE_SCHEMA,
+    SCHEMA,
+    FrameBlock,
+    FramesWriter,
+    Pictures,
+    Ranges,
+)
 from sdt_tools.dataset.manifest import MANIFEST_FILE, Conflict, Used, manifest_toml
+from sdt_tools.dataset.pictures import picture_bytes
 from sdt_tools.dataset.select import TRAIN, VAL, Selection, select_frames
 from sdt_tools.errors import DatasetError, OutputExistsError
 from sdt_tools.labeling.vocabulary import LabelKind
@@ -46,7 +55,9 @@ class DatasetSummary:
     conflicts: int | None
     """Frames in a safety domain with a forbidden label; None where they were not looked for."""
     unmatched_labels: int
-    """Labels without a scan near enough."""
+    """Labels without a scan or a readable picture near enough."""
+    unreadable: dict[str, tuple[int, ...]]
+    """Stamps of the pictures that no decoder reads, by recording; they are left out."""
     disputed_stamps: int
     """Stamps left out because humans disagree about them."""
     broken_lines: int
@@ -67,7 +78,8 @@ def build_dataset(
     """Build the folder ``out`` with frames.parquet and manifest.toml; the same inputs give the same content.
 
     The recordings ``validation`` alone validate, and all ``recordings`` train; without any, the configuration's share
-    of ``recordings`` validates. ``progress`` counts recordings read, each once for its labels and once for its scans.
+    of ``recordings`` validates. ``progress`` counts recordings read, each once for its labels and once for its frames.
+    Scans alone go through ``conflict_check``.
 
     Raises OutputExistsError; RecordingError or LabelError for an input that cannot be read; DatasetError where no
     recording is given, one is given twice, a class cannot fill its quota (naming class, have and need), or, unless the
@@ -86,22 +98,25 @@ def build_dataset(
     labelled.sort(key=lambda recording: recording.recording_id)
     _refuse_repeated(labelled)
     selections = select_frames(labelled, config, named)
-    classes = LabelKind(config.kind).classes
+    kind = LabelKind(config.kind)
+    classes = kind.classes
+    scans = kind is LabelKind.MOTION
+    check = conflict_check if scans else None
     with _folder_when_whole(out) as scratch:
         conflicts: list[Conflict] = []
-        with FramesWriter(scratch / FRAMES_FILE, classes) as writer:
+        with FramesWriter(scratch / FRAMES_FILE, classes, SCHEMA if scans else PICTURE_SCHEMA) as writer:
             for place, selection in enumerate(selections):
                 report(len(labelled) + place, total)
-                for block in _blocks(selection):
+                for block in _scan_blocks(selection) if scans else _picture_blocks(selection):
                     writer.write(block)
-                    if conflict_check is not None:
-                        conflicts += _conflicts(block, conflict_check, classes)
+                    if check is not None:
+                        conflicts += _conflicts(block, check, classes)
             frames_hash = writer.close()
         if conflicts and not config.allow_conflicts:
             raise DatasetError(_refusal(conflicts, config))
         counts = _counts(selections, classes)
         used = [Used(entry.recording, entry.split, len(entry.frames)) for entry in selections]
-        found = None if conflict_check is None else conflicts
+        found = None if check is None else conflicts
         manifest = manifest_toml(config, classes, counts, used, found, frames_hash)
         (scratch / MANIFEST_FILE).write_text(manifest, encoding="utf-8")
     report(total, total)
@@ -114,6 +129,7 @@ def build_dataset(
         counts=counts,
         conflicts=None if found is None else len(found),
         unmatched_labels=sum(recording.unmatched for recording in labelled),
+        unreadable={entry.path.stem: entry.unreadable_ns for entry in labelled if entry.unreadable_ns},
         disputed_stamps=sum(recording.disputed for recording in labelled),
         broken_lines=sum(recording.broken_lines for recording in labelled),
         incomplete=tuple(entry.incomplete for entry in labelled if entry.incomplete is not None),
@@ -132,11 +148,10 @@ def _refuse_repeated(labelled: Sequence[LabelledRecording]) -> None:
             raise DatasetError(f"{one.path} and {other.path} are the same recording ({one.recording_id}); give it once")
 
 
-def _blocks(selection: Selection) -> Iterator[FrameBlock]:
+def _scan_blocks(selection: Selection) -> Iterator[FrameBlock]:
     """The chosen frames of a recording with their ranges, in order of time within each block of its scans."""
     recording = selection.recording
     chosen = recording.positions[selection.frames]
-    pool = recording.pool
     start = 0
     if not len(chosen):
         return
@@ -146,18 +161,34 @@ def _blocks(selection: Selection) -> Iterator[FrameBlock]:
             frames, rows = selection.frames[here], chosen[here] - start
             start += len(batch)
             if len(here):
-                yield FrameBlock(
-                    split=selection.split,
-                    recording_id=recording.recording_id,
-                    recording=recording.path.stem,
-                    stamps_ns=pool.stamps_ns[frames],
-                    labels=pool.labels[frames],
-                    ranges_m=batch.ranges_m[rows],
-                )
+                yield _block(selection, frames, batch.ranges_m[rows])
+
+
+def _picture_blocks(selection: Selection) -> Iterator[FrameBlock]:
+    """The chosen frames of a recording with their pictures, in order of time."""
+    recording = selection.recording
+    chosen = recording.positions[selection.frames]
+    if len(chosen):
+        with Recording.open(recording.path) as opened:
+            pictures = dict(picture_bytes(opened, chosen))
+        yield _block(selection, selection.frames, [pictures[place] for place in chosen.tolist()])
+
+
+def _block(selection: Selection, frames: Int64[np.ndarray, "_"], content: Ranges | Pictures) -> FrameBlock:
+    recording = selection.recording
+    return FrameBlock(
+        split=selection.split,
+        recording_id=recording.recording_id,
+        recording=recording.path.stem,
+        stamps_ns=recording.pool.stamps_ns[frames],
+        labels=recording.pool.labels[frames],
+        content=content,
+    )
 
 
 def _conflicts(block: FrameBlock, check: ConflictCheck, classes: Sequence[str]) -> list[Conflict]:
-    forbidden = np.flatnonzero(check(block.ranges_m, block.labels)).tolist()
+    assert isinstance(block.content, np.ndarray)
+    forbidden = np.flatnonzero(check(block.content, block.labels)).tolist()
     return [
         Conflict(block.recording, int(block.stamps_ns[place]), classes[int(block.labels[place])]) for place in forbidden
     ]

@@ -1,4 +1,4 @@
-"""The labelled frames of a recording, known by stamp and label alone; scans are read once the frames are chosen."""
+"""The labelled frames of a recording, known by stamp and label alone; the rest is read once the frames are chosen."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -9,6 +9,7 @@ from jaxtyping import Int64
 
 from sdt_tools.dataset.choice import Pool
 from sdt_tools.dataset.config import DatasetConfig
+from sdt_tools.dataset.pictures import picture_stamps
 from sdt_tools.labeling.journal import read_journal
 from sdt_tools.labeling.resolve import disagreements, resolve
 from sdt_tools.labeling.vocabulary import LabelKind, journal_path
@@ -25,7 +26,7 @@ MS_NS = 1_000_000
 class LabelledRecording:
     """A recording, its journal, and its frames that have a label.
 
-    ``pool`` holds the frames in order of time, ``positions`` where each stands among the recording's scans.
+    ``pool`` holds the frames in order of time, ``positions`` where each stands among the recording's scans or pictures.
     """
 
     path: Path
@@ -36,7 +37,10 @@ class LabelledRecording:
     journal_sha256: str
     pool: Pool
     positions: Int64[np.ndarray, "frames"]
-    scans: int
+    recorded: int
+    """Its scans, or the pictures that can be read."""
+    unreadable_ns: tuple[int, ...]
+    """Stamps of pictures that no decoder reads: they are left out."""
     labels: int
     disputed: int
     """Stamps without a label because humans disagree."""
@@ -47,12 +51,12 @@ class LabelledRecording:
 
     @property
     def unmatched(self) -> int:
-        """Labels without a scan near enough."""
+        """Labels without a scan or a readable picture near enough."""
         return self.labels - len(self.pool.stamps_ns)
 
 
 def read_labelled(path: Path, labels_dir: Path, config: DatasetConfig) -> LabelledRecording:
-    """Join the scans of the recording at ``path`` with its resolved labels; ranges do not stay in memory.
+    """Join the frames of the recording at ``path`` with its resolved labels; only their stamps stay in memory.
 
     Raises RecordingError or LabelError where either cannot be read.
     """
@@ -62,12 +66,11 @@ def read_labelled(path: Path, labels_dir: Path, config: DatasetConfig) -> Labell
         recording_id = recording.recording_id
         scenario = recording.session.get("scenario", "")
         acts = read_journal(journal, recording_id)
-        batches = [batch.stamps_ns.copy() for batch in recording.scan_batches(SCANS_A_BATCH)]
+        frame_stamps_ns, unreadable_ns = _stamps(recording, kind)
         missing = incomplete(recording)
     labels = resolve(acts)
-    scan_stamps_ns = np.concatenate(batches) if batches else np.empty(0, dtype=np.int64)
-    by_time = np.argsort(scan_stamps_ns, kind="stable")
-    pairs = nearest_pairs(labels["stamp_ns"].to_numpy(), scan_stamps_ns[by_time], round(config.tolerance_ms * MS_NS))
+    by_time = np.argsort(frame_stamps_ns, kind="stable")
+    pairs = nearest_pairs(labels["stamp_ns"].to_numpy(), frame_stamps_ns[by_time], round(config.tolerance_ms * MS_NS))
     in_time = pairs[np.argsort(pairs[:, 1])]
     index = {name: place for place, name in enumerate(kind.classes)}
     codes = labels["label"].replace_strict(index, return_dtype=pl.Int64).to_numpy()
@@ -79,11 +82,20 @@ def read_labelled(path: Path, labels_dir: Path, config: DatasetConfig) -> Labell
         sha256=content_hash(path),
         journal=journal,
         journal_sha256=content_hash(journal),
-        pool=Pool(scan_stamps_ns[positions], codes[in_time[:, 0]]),
+        pool=Pool(frame_stamps_ns[positions], codes[in_time[:, 0]]),
         positions=positions,
-        scans=len(scan_stamps_ns),
+        recorded=len(frame_stamps_ns),
+        unreadable_ns=unreadable_ns,
         labels=len(labels),
         disputed=disagreements(acts)["stamp_ns"].n_unique(),
         broken_lines=len(acts.broken_lines),
         incomplete=missing,
     )
+
+
+def _stamps(recording: Recording, kind: LabelKind) -> tuple[Int64[np.ndarray, "frames"], tuple[int, ...]]:
+    """When each frame of that kind was taken, as they follow in the file, and the stamps of unreadable ones."""
+    if kind is LabelKind.GESTURE:
+        return picture_stamps(recording)
+    batches = [batch.stamps_ns.copy() for batch in recording.scan_batches(SCANS_A_BATCH)]
+    return np.concatenate(batches) if batches else np.empty(0, dtype=np.int64), ()

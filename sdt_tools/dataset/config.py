@@ -14,9 +14,10 @@ class DatasetConfig(Config):
     With ``balanced``, all classes have equal quotas (or quotas one apart, where a total does not divide).
     """
 
-    kind: Literal["motion"] = "motion"
+    kind: Literal["motion", "gesture"] = "motion"
+    """What is learnt: motions from scans, or gestures from pictures."""
     tolerance_ms: float = Field(default=10.0, ge=0.0, le=1000.0)
-    """A label belongs to a scan that is no farther from it in time: half a period of a scan at 50 Hz."""
+    """A label belongs to a scan or picture that is no farther from it in time: half a period of a scan at 50 Hz."""
     spacing_s: float = Field(default=0.4, ge=0.0)
     """Frames of one recording are at least so far apart; closer ones hardly differ."""
     per_recording_cap: int | None = Field(default=40, ge=1)

@@ -19,38 +19,47 @@ from sdt_tools.frames import RAYS
 
 FRAMES_FILE: Final = "frames.parquet"
 ROWS_A_GROUP: Final = 2048
-COLUMNS: Final = ("split", "label", "label_name", "recording_id", "recording", "stamp_ns", "ranges_m")
 _NAME = pa.dictionary(pa.int32(), pa.string())
-SCHEMA: Final = pa.schema(
-    [
-        ("split", _NAME),
-        ("label", pa.uint8()),
-        ("label_name", _NAME),
-        ("recording_id", _NAME),
-        ("recording", _NAME),
-        ("stamp_ns", pa.int64()),
-        ("ranges_m", pa.list_(pa.float64(), RAYS)),
-    ]
-)
+_COMMON: Final = [
+    ("split", _NAME),
+    ("label", pa.uint8()),
+    ("label_name", _NAME),
+    ("recording_id", _NAME),
+    ("recording", _NAME),
+    ("stamp_ns", pa.int64()),
+]
+SCHEMA: Final = pa.schema([*_COMMON, ("ranges_m", pa.list_(pa.float64(), RAYS))])
+"""Of scans: metres as the sensor gave them, codes kept."""
+PICTURE_SCHEMA: Final = pa.schema([*_COMMON, ("picture", pa.binary())])
+"""Of pictures: the bytes as the camera or its driver compressed them, JPEG or PNG."""
+
+
+Ranges = Float64[np.ndarray, "frames rays"]
+Pictures = Sequence[bytes]
 
 
 @dataclass(frozen=True, eq=False)
 class FrameBlock:
-    """Frames of one recording that go into one split; ``ranges_m`` in metres as the sensor gave them, codes kept."""
+    """Frames of one recording that go into one split.
+
+    ``content`` is what the sensor gave: ranges in metres, codes kept, or compressed pictures.
+    """
 
     split: str
     recording_id: str
     recording: str
     stamps_ns: Int64[np.ndarray, "frames"]
     labels: Int64[np.ndarray, "frames"]
-    ranges_m: Float64[np.ndarray, "frames rays"]
+    content: Ranges | Pictures
 
 
 class FramesHash:
     """SHA-256 over frames in the order they are added, however they are cut into blocks."""
 
-    def __init__(self) -> None:
-        self._columns = {name: hashlib.sha256() for name in ("split", "recording_id", "stamp_ns", "label", "ranges_m")}
+    def __init__(self, schema: pa.Schema = SCHEMA) -> None:
+        self._content = schema.names[-1]
+        names = ("split", "recording_id", "stamp_ns", "label", self._content)
+        self._columns = {name: hashlib.sha256() for name in names}
 
     def add(
         self,
@@ -58,14 +67,19 @@ class FramesHash:
         recording_ids: Sequence[str],
         stamps_ns: Int64[np.ndarray, "frames"],
         labels: Int64[np.ndarray, "frames"],
-        ranges_m: Float64[np.ndarray, "frames rays"],
+        content: Ranges | Pictures,
     ) -> None:
         """Take in frames that follow those before; one entry of each argument a frame."""
         self._columns["split"].update("".join(f"{split}\0" for split in splits).encode())
         self._columns["recording_id"].update("".join(f"{name}\0" for name in recording_ids).encode())
         self._columns["stamp_ns"].update(stamps_ns.astype("<i8").tobytes())
         self._columns["label"].update(labels.astype("<u1").tobytes())
-        self._columns["ranges_m"].update(np.ascontiguousarray(ranges_m, dtype="<f8").data)
+        digest = self._columns[self._content]
+        if isinstance(content, np.ndarray):
+            digest.update(np.ascontiguousarray(content, dtype="<f8").data)
+            return
+        for picture in content:
+            digest.update(len(picture).to_bytes(8, "little") + picture)
 
     def hexdigest(self) -> str:
         """The hash of all frames so far."""
@@ -78,18 +92,20 @@ class FramesHash:
 class FramesWriter:
     """Writes blocks of frames to a Parquet file, a row group at a time."""
 
-    def __init__(self, path: Path, classes: Sequence[str]) -> None:
+    def __init__(self, path: Path, classes: Sequence[str], schema: pa.Schema = SCHEMA) -> None:
         self._classes = classes
-        self._hash = FramesHash()
+        self._schema = schema
+        self._hash = FramesHash(schema)
         self._waiting: list[pa.RecordBatch] = []
         self._rows = 0
-        self._writer = pq.ParquetWriter(path, SCHEMA, compression="zstd")
+        self._writer = pq.ParquetWriter(path, schema, compression="zstd")
 
     def write(self, block: FrameBlock) -> None:
         """Append the frames of ``block``."""
         count = len(block.stamps_ns)
         splits, recording_ids = [block.split] * count, [block.recording_id] * count
-        self._hash.add(splits, recording_ids, block.stamps_ns, block.labels, block.ranges_m)
+        self._hash.add(splits, recording_ids, block.stamps_ns, block.labels, block.content)
+        content = block.content
         columns = {
             "split": splits,
             "label": block.labels.astype(np.uint8),
@@ -97,9 +113,11 @@ class FramesWriter:
             "recording_id": recording_ids,
             "recording": [block.recording] * count,
             "stamp_ns": block.stamps_ns,
-            "ranges_m": pa.FixedSizeListArray.from_arrays(pa.array(block.ranges_m.ravel()), RAYS),
+            self._schema.names[-1]: pa.FixedSizeListArray.from_arrays(pa.array(content.ravel()), RAYS)
+            if isinstance(content, np.ndarray)
+            else list(content),
         }
-        self._waiting.append(pa.Table.from_pydict(columns, schema=SCHEMA))
+        self._waiting.append(pa.Table.from_pydict(columns, schema=self._schema))
         self._rows += count
         if self._rows >= ROWS_A_GROUP:
             self._flush()

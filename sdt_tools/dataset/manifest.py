@@ -46,7 +46,7 @@ def manifest_toml(
         "format": FORMAT,
         "hash": frames_hash,
         "code_version": __version__,
-        "rays": RAYS,
+        **({"rays": RAYS} if config.kind == "motion" else {}),
         "classes": list(classes),
         "config": config.model_dump(mode="json", exclude_none=True),
         "frames": {split: sum(by_class.values()) for split, by_class in counts.items()},
@@ -58,12 +58,12 @@ def manifest_toml(
                 for conflict in conflicts or ()
             ],
         },
-        "recordings": [_entry(entry) for entry in used],
+        "recordings": [_entry(entry, "scans" if config.kind == "motion" else "pictures") for entry in used],
     }
     return tomli_w.dumps(document)
 
 
-def _entry(used: Used) -> dict[str, Any]:
+def _entry(used: Used, frames: str) -> dict[str, Any]:
     recording = used.recording
     return {
         "recording": recording.path.stem,
@@ -75,7 +75,8 @@ def _entry(used: Used) -> dict[str, Any]:
         "journal_sha256": recording.journal_sha256,
         "truncated": recording.incomplete is not None and recording.incomplete.truncated,
         "damaged_chunks": 0 if recording.incomplete is None else len(recording.incomplete.damage),
-        "scans": recording.scans,
+        frames: recording.recorded,
+        **({"unreadable_pictures_ns": list(recording.unreadable_ns)} if recording.unreadable_ns else {}),
         "labels": recording.labels,
         "unmatched_labels": recording.unmatched,
         "disputed_stamps": recording.disputed,

@@ -14,7 +14,6 @@ from sdt_tools.frames import (
     MotionCommand,
     Odometry,
     OperatorPose,
-    OperatorState,
     Received,
 )
 from sdt_tools.protocols import SourceInfo
@@ -49,7 +48,7 @@ class MemoryRecorder:
             scan,
             Odometry(stamp_ns, world.robot),
             OperatorPose(stamp_ns, world.operator),
-            OperatorState(stamp_ns, world.gesture, world.commanded_mode),
+            world.operator_state(stamp_ns, world.time_s),
         ]
 
     def command(self, command: MotionCommand) -> None:

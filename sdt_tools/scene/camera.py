@@ -1,6 +1,5 @@
 """The robot's camera in the scene: one picture for each state of the world, the same bytes for the same state."""
 
-from collections.abc import Sequence
 from typing import Final
 
 import cv2
@@ -8,7 +7,7 @@ import numpy as np
 from jaxtyping import Float32, Float64, UInt8
 
 from sdt_tools.frames import Gesture, Pose2D
-from sdt_tools.scene.layout import GestureEvent, Layout
+from sdt_tools.scene.layout import AS_EVER, Behaviour, Layout, Manner
 from sdt_tools.scene.rendering.figure import Figure
 from sdt_tools.scene.rendering.furniture import build_furniture
 from sdt_tools.scene.rendering.light import light_over
@@ -17,6 +16,7 @@ from sdt_tools.scene.rendering.person import draw_person
 from sdt_tools.scene.rendering.photometry import take_picture
 from sdt_tools.scene.rendering.posture import posture_of
 from sdt_tools.scene.rendering.projection import CameraMount, Pinhole, view_from
+from sdt_tools.scene.rendering.props import HANDY, build_props
 from sdt_tools.scene.rendering.raster import draw
 from sdt_tools.scene.rendering.room import build_room
 from sdt_tools.scene.rendering.texture import TextureBank
@@ -24,8 +24,9 @@ from sdt_tools.scene.seeds import Stream, generator
 
 _FRAMES: Final = 1_000_003
 """More frames than one recording has, so that no two seeds share their noise."""
-_ARMS_MOVE_S: Final = 0.6
-"""How long arms take from rest to a gesture, and back."""
+
+_IN_HAND: Final = 0.15
+"""How far into a behaviour what belongs to it is in the hand: taken out of a pocket, picked up."""
 
 # One frame runs on one thread; more would fight over the cores with the other processes.
 cv2.setNumThreads(1)
@@ -50,9 +51,11 @@ class SceneCamera:
         room, room_rims = build_room(layout.walls, bounds, ceiling_m, self._light, bank, of_room)
         furniture, furniture_rims = build_furniture(layout.boxes, layout.posts, self._light, bank, of_room)
         plan = layout.operator
-        person = draw_person(of_person, plan.leg_separation_m, plan.leg_radius_m)
+        person = draw_person(of_person, plan.leg_separation_m, plan.leg_radius_m, layout.mask)
         self._step_m = plan.step_length_m
         self._figure = Figure(person, bank, of_person)
+        holds = any(event.does in HANDY for event in layout.behaviours)
+        self._props = build_props(person, self._figure.joints, bank, of_person) if holds else {}
         self._solids = join([furniture, room])
         self._rims = join([room_rims, furniture_rims])
         self._textures = bank.pack()
@@ -66,17 +69,19 @@ class SceneCamera:
         operator: Pose2D,
         gait_phase: float = 0.0,
         gait_amplitude: float = 0.0,
-        gesture: Gesture = Gesture.IDLE,
+        gesture: Gesture | Behaviour = Gesture.IDLE,
         gesture_phase: float = 1.0,
         time_s: float = 0.0,
         frame: int = 0,
+        manner: Manner = AS_EVER,
     ) -> UInt8[np.ndarray, "480 640 3"]:
         """The picture (blue, green, red) from a robot whose centre is at ``robot``.
 
         ``gait_phase`` in radians and ``gait_amplitude`` (0 to 1) are the walker's; ``gesture_phase`` runs from 0, arms
-        down, to 1, gesture made; ``time_s`` is for the small movements of one who stands; ``frame`` for the noise.
+        down, to 1, gesture or behaviour made, in its ``manner``; ``time_s`` is for the small movements of one who
+        stands; ``frame`` for the noise.
         """
-        self._draw(robot, operator, gait_phase, gait_amplitude, gesture, gesture_phase, time_s)
+        self._draw(robot, operator, gait_phase, gait_amplitude, gesture, gesture_phase, time_s, manner)
         return take_picture(self._radiance, self._light.kind, (self._seed * _FRAMES + frame) % 2**63)
 
     def depth(
@@ -85,15 +90,16 @@ class SceneCamera:
         operator: Pose2D,
         gait_phase: float = 0.0,
         gait_amplitude: float = 0.0,
-        gesture: Gesture = Gesture.IDLE,
+        gesture: Gesture | Behaviour = Gesture.IDLE,
         gesture_phase: float = 1.0,
         time_s: float = 0.0,
+        manner: Manner = AS_EVER,
     ) -> Float32[np.ndarray, "480 640"]:
         """Distance along the optical axis of what each pixel of ``render`` shows, metres; infinite for nothing.
 
         What hangs on walls or under the ceiling is 0.4 % nearer than these.
         """
-        self._draw(robot, operator, gait_phase, gait_amplitude, gesture, gesture_phase, time_s)
+        self._draw(robot, operator, gait_phase, gait_amplitude, gesture, gesture_phase, time_s, manner)
         with np.errstate(divide="ignore"):
             return np.float32(1.0) / self._inverse_depth
 
@@ -103,32 +109,24 @@ class SceneCamera:
         operator: Pose2D,
         gait_phase: float,
         gait_amplitude: float,
-        gesture: Gesture,
+        gesture: Gesture | Behaviour,
         gesture_phase: float,
         time_s: float,
+        manner: Manner,
     ) -> None:
         """Fill the buffers: what is near first, so that little is painted twice."""
         stride_m = gait_amplitude * self._step_m / 2
-        posture = posture_of(self._figure.person, gait_phase, stride_m, gesture, gesture_phase, time_s)
-        figure, shade = self._figure.stand(posture, operator, self._light)
+        person = self._figure.person
+        posture = posture_of(person, gait_phase, stride_m, gesture, gesture_phase, time_s, manner)
+        holding = None
+        if isinstance(gesture, Behaviour) and gesture_phase > _IN_HAND:
+            holding = self._props.get((gesture, person.style.left_handed != manner.other_hand))
+        figure, shade = self._figure.stand(posture, operator, self._light, holding)
         view = view_from(robot, self.mount)
         self._radiance[:] = 0.0
         self._inverse_depth[:] = 0.0
         for mesh in (figure, self._solids, self._rims, shade):
             draw(mesh, self._textures, view, self.calibration, self._radiance, self._inverse_depth)
-
-
-def gesture_of_arms(gestures: Sequence[GestureEvent], time_s: float) -> tuple[Gesture, float]:
-    """The gesture that the arms are making at ``time_s``, and how far they are in it, from 0 to 1.
-
-    Arms rise when a gesture begins and sink when it has ended.
-    """
-    for event in reversed(gestures):
-        if event.at_s <= time_s:
-            rising = (time_s - event.at_s) / _ARMS_MOVE_S
-            sinking = 1.0 - (time_s - event.at_s - event.lasts_s) / _ARMS_MOVE_S
-            return event.gesture, min(1.0, max(0.0, min(rising, sinking)))
-    return Gesture.IDLE, 1.0
 
 
 def _bounds_m(layout: Layout) -> Float64[np.ndarray, "4"]:

@@ -10,11 +10,11 @@ from sdt_tools.frames import (
     CameraCalibration,
     FrameTransform,
     Message,
-    OperatorState,
     Pose2D,
     RawPicture,
 )
-from sdt_tools.scene.camera import SceneCamera, gesture_of_arms
+from sdt_tools.scene.camera import SceneCamera
+from sdt_tools.scene.gestures import arms_at
 from sdt_tools.scene.world import STEP_S, World
 
 
@@ -40,20 +40,21 @@ class SceneFilm:
         while (stamp_ns := self._start_ns + round(self._taken * period_ns)) <= now_ns:
             share = 1.0 - (now_ns - stamp_ns) / (STEP_S * SECOND_NS)
             time_s = (stamp_ns - self._start_ns) / SECOND_NS
-            arms, arms_phase = gesture_of_arms(world.layout.gestures, time_s)
+            arms = arms_at(world.layout.gestures, world.layout.behaviours, time_s)
             picture = self._camera.render(
                 between(robot_before, world.robot, share),
                 between(operator_before, world.operator, share),
                 world.gait_phase,
                 world.gait_amplitude,
-                arms,
-                arms_phase,
+                arms.makes,
+                arms.share,
                 time_s,
                 self._taken,
+                arms.manner,
             )
             self._taken += 1
             yield RawPicture(stamp_ns, stamp_ns, picture)
-            yield OperatorState(stamp_ns, world.gesture_at(time_s), world.commanded_mode_at(time_s))
+            yield world.operator_state(stamp_ns, time_s)
 
 
 def between(before: Pose2D, after: Pose2D, share: float) -> Pose2D:

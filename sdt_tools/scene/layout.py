@@ -5,7 +5,8 @@ Metres, radians and seconds, in the frame of the scenario: x ahead of the robot'
 
 import math
 from dataclasses import dataclass, field
-from typing import Final
+from enum import StrEnum
+from typing import Final, Literal
 
 import numpy as np
 from jaxtyping import Float64
@@ -71,20 +72,92 @@ class OperatorPlan:
     leg_separation_m: float
     step_length_m: float
     first_phase_rad: float
+    faces_off_rad: float = 0.0
+    """How far beside the robot he faces when he waits for it."""
+
+
+class Behaviour(StrEnum):
+    """What an idle operator does with his hands that is no gesture, but might be taken for one."""
+
+    SCRATCH_HEAD = "scratch_head"
+    RUB_NECK = "rub_neck"
+    TOUCH_FACE = "touch_face"
+    DRINK = "drink"
+    PHONE_CALL = "phone_call"
+    PHONE_TEXT = "phone_text"
+    POINT_AHEAD = "point_ahead"
+    POINT_ASIDE = "point_aside"
+    CARRY_BOX = "carry_box"
+    FOLD_ARMS = "fold_arms"
+    HANDS_ON_HIPS = "hands_on_hips"
+    WAVE_LOW = "wave_low"
+    SHRUG = "shrug"
+
+
+@dataclass(frozen=True)
+class Manner:
+    """How one gesture or behaviour differs from another by the same person; zeros are his habit. Radians."""
+
+    raise_rad: float = 0.0
+    elbow_rad: float = 0.0
+    forward_rad: float = 0.0
+    spread_rad: float = 0.0
+    uneven_rad: float = 0.0
+    """How much higher the left arm is held than the right one."""
+    phase_rad: float = 0.0
+    """Of what is moved to and fro."""
+    other_hand: bool = False
+
+
+AS_EVER: Final = Manner()
 
 
 @dataclass(frozen=True)
 class GestureEvent:
-    """A gesture shown from ``at_s`` on for ``lasts_s``."""
+    """A gesture shown from ``at_s`` on for ``lasts_s``.
+
+    Arms take ``moves_s`` from rest to it; they begin ``lead_s`` before ``at_s``, and as long before it ends they sink.
+    """
 
     at_s: float
     gesture: Gesture
     lasts_s: float
+    moves_s: float = 0.6
+    lead_s: float = 0.0
+    manner: Manner = AS_EVER
+
+
+@dataclass(frozen=True)
+class BehaviourEvent:
+    """Something that the operator does with his hands, timed as a gesture is. A gesture goes before it."""
+
+    at_s: float
+    does: Behaviour
+    lasts_s: float
+    moves_s: float = 0.6
+    lead_s: float = 0.0
+    manner: Manner = AS_EVER
+
+
+Surroundings = Literal["indoor", "outdoor", "garage"]
+CameraKind = Literal["plain", "video"]
+
+
+@dataclass(frozen=True)
+class Sun:
+    """Where the sun stands: counter-clockwise from x, and above the horizon."""
+
+    azimuth_rad: float
+    elevation_rad: float
 
 
 @dataclass(frozen=True)
 class Layout:
-    """A drawn world. ``robot`` is the pose of the robot's centre; gestures are in the order of their times."""
+    """A drawn world. ``robot`` is the pose of the robot's centre; gestures and behaviours are in the order of time.
+
+    For the camera: without ``surroundings`` the light tells them; ``mask`` forces or forbids a surgical mask; a
+    ``video`` camera adapts its exposure with time, blurs what it turns past, and is dazzled.
+    """
 
     name: str
     seed: int
@@ -96,6 +169,11 @@ class Layout:
     posts: tuple[Post, ...] = ()
     gestures: tuple[GestureEvent, ...] = field(default=())
     light: str = "indoor"
+    behaviours: tuple[BehaviourEvent, ...] = ()
+    surroundings: Surroundings | None = None
+    sun: Sun | None = None
+    mask: bool | None = None
+    camera: CameraKind = "plain"
 
     def segments(self) -> Float64[np.ndarray, "segments 4"]:
         """Everything straight that a ray can meet: x0, y0, x1, y1 of walls, then of the boxes' sides."""

@@ -5,6 +5,7 @@ Metres, degrees, seconds; x ahead, y left. ``mirror = true`` flips half of the s
 
 import difflib
 import math
+from dataclasses import replace
 from pathlib import Path
 from typing import Annotated, Final, Literal
 
@@ -14,10 +15,25 @@ from pydantic import AfterValidator, BeforeValidator, Field, model_validator
 from sdt_tools.config import Config, load_config
 from sdt_tools.errors import ConfigError
 from sdt_tools.frames import Gesture, Pose2D
-from sdt_tools.scene.layout import Box, GestureEvent, Layout, OperatorPlan, Post, Wall
+from sdt_tools.scene.layout import (
+    Behaviour,
+    BehaviourEvent,
+    Box,
+    CameraKind,
+    GestureEvent,
+    Layout,
+    OperatorPlan,
+    Post,
+    Sun,
+    Surroundings,
+    Wall,
+)
+from sdt_tools.scene.manners import with_manners
 from sdt_tools.scene.practice import PRACTICE_FAMILIES, practice_layout
 from sdt_tools.scene.practice_courses import NAME as PRACTICE_COURSE
 from sdt_tools.scene.practice_courses import course_layout
+from sdt_tools.scene.practice_gestures import NAME as PRACTICE_GESTURES
+from sdt_tools.scene.practice_gestures import gesture_layout
 from sdt_tools.scene.seeds import Stream, generator
 from sdt_tools.scene.validity import check_layout
 
@@ -31,6 +47,17 @@ STANDARD_FOLLOW: Final = (
     "narrow_hallway",
 )
 """The standard scenarios of the follow network, in the order of the paper's Table IV."""
+
+STANDARD_VISION: Final = (
+    "forward_backward",
+    "surgical_mask",
+    "direct_sunlight",
+    "staying_idle",
+    "summon_out_of_garage",
+    "artificial_light_idle",
+    "artificial_light_follow",
+)
+"""The standard scenarios of the vision network, in the order of the paper's Table V."""
 
 _FOLDER: Final = Path(__file__).parent / "scenarios"
 
@@ -145,6 +172,21 @@ class GestureSpec(Config):
     lasts_s: Positive = _fixed(2.0)
 
 
+class BehaviourSpec(Config):
+    """What an idle operator does with his hands, which may look like a gesture."""
+
+    at_s: NotNegative
+    does: Behaviour
+    lasts_s: Positive = _fixed(3.0)
+
+
+class SunSpec(Config):
+    """Where the sun stands: counter-clockwise from straight ahead of the nominal robot, and above the horizon."""
+
+    azimuth_deg: Number
+    elevation_deg: Positive
+
+
 class Scenario(Config):
     """A scenario file."""
 
@@ -157,8 +199,26 @@ class Scenario(Config):
     wall: tuple[WallSpec, ...] = ()
     box: tuple[BoxSpec, ...] = ()
     post: tuple[PostSpec, ...] = ()
-    light: Literal["indoor", "artificial", "sunlight", "dim"] = "indoor"
+    light: Literal["indoor", "artificial", "sunlight", "overcast", "dim"] = "indoor"
     gestures: tuple[GestureSpec, ...] = ()
+    behaviours: tuple[BehaviourSpec, ...] = ()
+    surroundings: Surroundings | None = None
+    """Without it the light tells: outdoors in sunlight and under clouds, else indoors."""
+    sun: SunSpec | None = None
+    """Without it, anywhere."""
+    mask: bool | None = None
+    """Whether the operator wears a surgical mask; without it, as chance has it."""
+    camera: CameraKind = "plain"
+    """``video`` takes time to adapt its exposure, blurs when it turns, is dazzled; and gestures vary."""
+
+    @model_validator(mode="after")
+    def _light_fits(self) -> "Scenario":
+        daylight = self.light in ("sunlight", "overcast")
+        if self.surroundings is not None and daylight != (self.surroundings != "indoor"):
+            raise ValueError(f"light = '{self.light}' does not fit surroundings = '{self.surroundings}'")
+        if self.sun is not None and not daylight:
+            raise ValueError(f"a sun does not fit light = '{self.light}'")
+        return self
 
 
 def scenario_names() -> tuple[str, ...]:
@@ -176,7 +236,7 @@ def load_scenario(name_or_path: str) -> Scenario:
     known = scenario_names()
     if name_or_path in known:
         return load_config(Scenario, _FOLDER / f"{name_or_path}.toml")
-    everything = [*known, *PRACTICE_FAMILIES, PRACTICE_COURSE]
+    everything = [*known, *PRACTICE_FAMILIES, PRACTICE_COURSE, PRACTICE_GESTURES]
     near = difflib.get_close_matches(name_or_path, everything, n=1)
     hint = f"did you mean '{near[0]}'? " if near else ""
     raise ConfigError(f"unknown scenario '{name_or_path}'; {hint}There are {', '.join(everything)}, or a file *.toml")
@@ -190,6 +250,8 @@ def layout_for(name_or_path: str, seed: int) -> Layout:
         return practice_layout(seed, PRACTICE_FAMILIES[name_or_path])
     if name_or_path == PRACTICE_COURSE:
         return course_layout(seed)
+    if name_or_path == PRACTICE_GESTURES:
+        return gesture_layout(seed)
     return draw(load_scenario(name_or_path), seed)
 
 
@@ -237,7 +299,29 @@ def draw(scenario: Scenario, seed: int) -> Layout:
             )
         ),
         light=scenario.light,
+        behaviours=tuple(
+            sorted(
+                (
+                    BehaviourEvent(spec.at_s.draw(rng), spec.does, spec.lasts_s.draw(rng))
+                    for spec in scenario.behaviours
+                ),
+                key=lambda event: event.at_s,
+            )
+        ),
+        surroundings=scenario.surroundings,
+        sun=None
+        if scenario.sun is None
+        else Sun(yaw(scenario.sun.azimuth_deg), math.radians(scenario.sun.elevation_deg.draw(rng))),
+        mask=scenario.mask,
+        camera=scenario.camera,
     )
+    if layout.camera == "video":
+        manners = generator(seed, Stream.MANNERS)
+        layout = replace(
+            layout,
+            gestures=with_manners(layout.gestures, manners),
+            behaviours=with_manners(layout.behaviours, manners),
+        )
     check_layout(layout)
     return layout
 

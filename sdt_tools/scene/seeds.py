@@ -14,6 +14,8 @@ class Stream(IntEnum):
     CAMERA = 3
     TOO_CLOSE = 4
     COURSE = 5
+    GESTURES = 6
+    MANNERS = 7
 
 
 def generator(seed: int, stream: Stream) -> np.random.Generator:

@@ -1,6 +1,7 @@
 """The scene as a source of messages, and as a thing to command."""
 
 from collections.abc import Iterator
+from dataclasses import replace
 from typing import Final, Protocol, runtime_checkable
 
 import numpy as np
@@ -149,12 +150,8 @@ class SceneSource:
     def _operator_state(self, now_ns: int) -> Iterator[Message]:
         """His gesture and what he has asked for, when one of them changes and once a second."""
         world, old = self.world, self._state
-        state = OperatorState(now_ns, world.gesture, world.commanded_mode)
-        if (
-            old is None
-            or (old.gesture, old.commanded_mode) != (state.gesture, state.commanded_mode)
-            or now_ns - old.stamp_ns >= SECOND_NS
-        ):
+        state = world.operator_state(now_ns, world.time_s)
+        if old is None or replace(old, stamp_ns=now_ns) != state or now_ns - old.stamp_ns >= SECOND_NS:
             self._state = state
             yield state
 

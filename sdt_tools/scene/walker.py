@@ -55,7 +55,7 @@ class Walker:
             self.gait_amplitude = max(0.0, self.gait_amplitude - _AMPLITUDE_PER_S * dt_s)
             if self._still_s > _FACES_ROBOT_AFTER_S:
                 x_m, y_m = self.pose.x_m, self.pose.y_m
-                self._turn_to(math.atan2(lidar.y_m - y_m, lidar.x_m - x_m), dt_s)
+                self._turn_to(math.atan2(lidar.y_m - y_m, lidar.x_m - x_m) + self._plan.faces_off_rad, dt_s)
         self._stand_by(robot)
 
     def legs(self) -> Float64[np.ndarray, "2 3"]:

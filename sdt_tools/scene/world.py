@@ -10,10 +10,10 @@ import numpy as np
 import pymunk
 from jaxtyping import Float64
 
-from sdt_tools.frames import ROBOT_LENGTH_M, ROBOT_WIDTH_M, Gesture, Mode, Pose2D, Twist
+from sdt_tools.frames import ROBOT_LENGTH_M, ROBOT_WIDTH_M, Gesture, Mode, OperatorState, Pose2D, Twist
 from sdt_tools.scene.config import PHYSICS_HZ, SceneConfig
 from sdt_tools.scene.drive import Drive
-from sdt_tools.scene.gestures import commanded_mode_at, gesture_at
+from sdt_tools.scene.gestures import behaviour_at, commanded_mode_at, gesture_at
 from sdt_tools.scene.layout import Layout, lidar_pose
 from sdt_tools.scene.seeds import Stream, generator
 from sdt_tools.scene.sight import any_visible
@@ -103,6 +103,11 @@ class World:
     def commanded_mode_at(self, time_s: float) -> Mode:
         """What he has asked the robot to be until ``time_s``."""
         return commanded_mode_at(self.layout.gestures, time_s)
+
+    def operator_state(self, stamp_ns: int, time_s: float) -> OperatorState:
+        """What he shows, does and has asked for at ``time_s``, stamped ``stamp_ns``."""
+        does = behaviour_at(self.layout.behaviours, time_s)
+        return OperatorState(stamp_ns, self.gesture_at(time_s), self.commanded_mode_at(time_s), does or "")
 
     @property
     def gait_phase(self) -> float:

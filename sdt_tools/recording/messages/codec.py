@@ -193,12 +193,13 @@ def _decode_command(data: bytes, stamp_ns: int) -> MotionCommand:
 def _encode_state(state: OperatorState) -> bytes:
     message = _new("sdt.OperatorState", state.stamp_ns)
     message.gesture, message.commanded_mode = state.gesture, state.commanded_mode
+    message.behaviour = state.behaviour
     return _bytes(message)
 
 
 def _decode_state(data: bytes, stamp_ns: int) -> OperatorState:
     message = _parser("sdt.OperatorState")(data)
-    return OperatorState(stamp_ns, Gesture(message.gesture), Mode(message.commanded_mode))
+    return OperatorState(stamp_ns, Gesture(message.gesture), Mode(message.commanded_mode), message.behaviour)
 
 
 def _encode_log(entry: LogEntry) -> bytes:

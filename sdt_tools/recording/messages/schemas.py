@@ -17,6 +17,7 @@ Ours, as they would be written in a ``.proto`` file of package ``sdt`` (the numb
       google.protobuf.Timestamp timestamp = 1;
       Gesture gesture = 2;
       Mode commanded_mode = 3;
+      string behaviour = 4;
     }
 """
 
@@ -82,6 +83,7 @@ def _own_file() -> FileDescriptorProto:
     _add_field(state, "timestamp", 1, field.TYPE_MESSAGE, _STAMP)
     _add_field(state, "gesture", 2, field.TYPE_ENUM, _GESTURE)
     _add_field(state, "commanded_mode", 3, field.TYPE_ENUM, _MODE)
+    _add_field(state, "behaviour", 4, field.TYPE_STRING)
     return file
 
 

@@ -12,7 +12,7 @@ from sdt_tools.scene.rendering.light import Light
 from sdt_tools.scene.rendering.mesh import Mesh, join
 from sdt_tools.scene.rendering.person import Person
 from sdt_tools.scene.rendering.skeleton import Bone, Posture, pose_bones, rest_joints
-from sdt_tools.scene.rendering.skin import carry
+from sdt_tools.scene.rendering.skin import Skin, carry, join_skins
 from sdt_tools.scene.rendering.texture import TextureBank
 
 _WRAP = 0.3
@@ -25,19 +25,20 @@ class Figure:
 
     def __init__(self, person: Person, bank: TextureBank, rng: np.random.Generator) -> None:
         self.person = person
-        self._joints = rest_joints(person)
-        self._skin = build_body(person, self._joints, paint_person(person, bank, rng))
+        self.joints = rest_joints(person)
+        self._skin = build_body(person, self.joints, paint_person(person, bank, rng))
 
-    def stand(self, posture: Posture, place: Pose2D, light: Light) -> tuple[Mesh, Mesh]:
-        """The lit figure in ``posture`` at ``place``, and the shade under it."""
-        bones = pose_bones(self._joints, posture, place)
-        bare = carry(self._skin, bones)
+    def stand(self, posture: Posture, place: Pose2D, light: Light, holding: Skin | None = None) -> tuple[Mesh, Mesh]:
+        """The lit figure in ``posture`` at ``place``, with what he is ``holding``; and the shade under it."""
+        bones = pose_bones(self.joints, posture, place)
+        skin = self._skin if holding is None else join_skins([self._skin, holding])
+        bare = carry(skin, bones)
         direction, strength = light.around(np.array([place.x_m, place.y_m, 0.6 * self.person.height_m]))
         facing = np.maximum((bare.normals @ direction + _WRAP) / (1 + _WRAP), 0.0)
         around = light.kind.ambient * (0.85 + 0.3 * bare.normals[:, 2])
-        lit = bare.lit(self._skin.openness * (around + strength * facing))
+        lit = bare.lit(skin.openness * (around + strength * facing))
         feet = [
-            self._shade_under(bones.rotations[foot] @ self._joints.at_m[foot] + bones.translations_m[foot], place)
+            self._shade_under(bones.rotations[foot] @ self.joints.at_m[foot] + bones.translations_m[foot], place)
             for foot in (Bone.FOOT_LEFT, Bone.FOOT_RIGHT)
         ]
         return lit, join([*feet, _disc(place.x_m, place.y_m, 0.12, 0.35, 0.75)])

@@ -29,6 +29,7 @@ KINDS: Final = {
     "artificial": LightKind(0.30, 0.75, 0.7, (0.72, 0.96, 1.08), 3.2),
     "dim": LightKind(0.50, 0.45, 0.25, (0.85, 0.95, 1.05), 5.0),
     "sunlight": LightKind(0.45, 1.30, 2.0, (0.93, 0.99, 1.05), 1.6, outdoors=True),
+    "overcast": LightKind(0.95, 0.12, 1.6, (1.03, 1.0, 0.96), 1.8, outdoors=True),
 }
 
 
