@@ -1,4 +1,4 @@
-"""The folder of a checkpoint, whatever network is in it: ``weights.safetensors`` and ``model.toml``, whole or not at all.
+"""A checkpoint's folder, whatever network is in it: ``weights.safetensors`` and ``model.toml``, whole or not at all.
 
 Reading takes numbers and text; nothing in the folder is ever executed.
 """

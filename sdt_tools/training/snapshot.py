@@ -8,7 +8,7 @@ import os
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Generic, TypeVar
+from typing import Generic, TypeVar
 
 import torch
 from safetensors import SafetensorError, safe_open
@@ -16,11 +16,9 @@ from safetensors.torch import save_file
 from torch import Tensor, nn
 
 from sdt_tools.errors import ConfigError, RunError
+from sdt_tools.training.record import Record
 
-if TYPE_CHECKING:
-    from _typeshed import DataclassInstance
-
-_RecordT = TypeVar("_RecordT", bound="DataclassInstance")
+_RecordT = TypeVar("_RecordT", bound=Record)
 
 
 def unfinished(out: Path) -> Path:

@@ -43,7 +43,7 @@ class VisionNet(nn.Module):
     ) -> Float[Tensor, "batch channels rows columns"]:
         """What comes out of the first ``blocks`` blocks."""
         features: Tensor = self.stem(self.normalise(images))
-        for block in self.blocks[:blocks]:
+        for block in list(self.blocks)[:blocks]:
             features = block(features)
         return features
 
@@ -58,7 +58,7 @@ class VisionNet(nn.Module):
         self, features: Float[Tensor, "batch channels rows columns"], blocks: int
     ) -> Float[Tensor, "batch features"]:
         """What the classifier sees: a place in feature space for each image."""
-        for block in self.blocks[blocks:]:
+        for block in list(self.blocks)[blocks:]:
             features = block(features)
         embedded: Tensor = self.mean(self.head(features))
         return embedded
@@ -96,7 +96,7 @@ def tune_last(network: VisionNet, last_blocks: int) -> int:
     network.requires_grad_(False)
     trained: list[nn.Module] = [network.classifier]
     if last_blocks:
-        trained += [network.head, *network.blocks[blocks - last_blocks :]]
+        trained += [network.head, *list(network.blocks)[blocks - last_blocks :]]
     for part in trained:
         part.requires_grad_(True)
     return blocks - last_blocks

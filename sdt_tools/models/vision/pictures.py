@@ -3,19 +3,13 @@
 Attacks count their steps on these pixels: red, green, blue in 8 bits, after resizing and before normalisation.
 """
 
-from typing import Final
-
 import cv2
 import numpy as np
 from jaxtyping import UInt8
 
+from sdt_tools.dataset.pictures import breaks_off
 from sdt_tools.errors import RecordingError
 from sdt_tools.models.vision.config import ImagePreprocessConfig
-
-_JPEG_BEGINS: Final = b"\xff\xd8"
-_JPEG_ENDS: Final = b"\xff\xd9"
-_TRAILER: Final = 64
-"""Cameras pad their pictures; the end is looked for in so many last bytes."""
 
 
 def decode_picture(data: bytes) -> UInt8[np.ndarray, "height width 3"]:
@@ -23,7 +17,7 @@ def decode_picture(data: bytes) -> UInt8[np.ndarray, "height width 3"]:
 
     Raises RecordingError for one that cannot be decoded or, as a JPEG, breaks off: decoders would fill it up with grey.
     """
-    if data.startswith(_JPEG_BEGINS) and _JPEG_ENDS not in data[-_TRAILER:]:
+    if breaks_off(data):
         raise RecordingError(f"a JPEG picture of {len(data)} bytes that breaks off before its end")
     picture = cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_COLOR_BGR) if data else None
     if picture is None:

@@ -88,8 +88,9 @@ def _resnet_file(network: VisionNet) -> Path:
     )
     if network.architecture != ResNetConfig(dropout=network.architecture.dropout) or not found:
         raise CheckpointError(
-            f"the ImageNet weights of ResNet-50 are neither given nor in {cache}; put model.safetensors of "
-            f"{RESNET_REPOSITORY} anywhere and name it with --weights, or use the backbone that needs no download, lite0"
+            f"the ImageNet weights of ResNet-50 are neither given nor in {cache}; put "
+            f"model.safetensors of {RESNET_REPOSITORY} anywhere and name it with --weights, or use the backbone that "
+            "needs no download, lite0"
         )
     return found[-1]
 

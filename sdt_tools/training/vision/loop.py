@@ -22,8 +22,9 @@ from sdt_tools.training.vision.data import VisionData
 
 @dataclass(frozen=True)
 class VisionEpoch:
-    """One epoch: means over its batches as they were trained on (varied, attacked by ``epsilon``, with dropout), and
-    the clean validation after it. Losses are plain cross-entropies.
+    """One epoch: means over its batches as they were trained on, and the clean validation after it.
+
+    Trained on are varied images, attacked by ``epsilon``, with dropout. Losses are plain cross-entropies.
     """
 
     epoch: int

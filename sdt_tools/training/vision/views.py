@@ -39,7 +39,7 @@ def varied(
     c, s = grow * math.cos(turn), grow * math.sin(turn)
     middle = np.array([(width - 1) / 2, (height - 1) / 2])
     linear = np.array([[c, -s], [s, c]]) @ np.diag([-1.0 if mirror else 1.0, 1.0])
-    motion = np.column_stack([linear, middle + (across, down) - linear @ middle])
+    motion = np.column_stack([linear, middle + np.array([across, down]) - linear @ middle])
     moved = cv2.warpAffine(image_u8, motion, (width, height), flags=cv2.INTER_LINEAR, borderMode=cv2.BORDER_REFLECT_101)
     lit = (moved.astype(np.float32) - 128.0) * np.float32(1.0 + contrast) + np.float32(128.0 + 128.0 * brightness)
     rounded: UInt8[np.ndarray, "height width 3"] = np.clip(np.rint(lit), 0.0, 255.0).astype(np.uint8)
