@@ -129,7 +129,7 @@ def _attack_batch(
         moved_u8 = moved.to(torch.uint8)
         assert int((moved_u8.int() - images_u8.int()).abs().max()) <= config.epsilon
         answers = _answers(network, moved_u8)
-        gained = _loss(answers, goals, targeted) > _loss(best, goals, targeted)
+        gained = _gain(answers, goals, targeted) > _gain(best, goals, targeted)
         if config.method == "fgsm":
             gained = torch.ones_like(gained)  # its one try counts, for better or worse
         best_u8 = torch.where(gained[:, None, None, None], moved_u8, best_u8)
@@ -143,12 +143,18 @@ def _answers(network: nn.Module, images_u8: UInt8[Tensor, "batch 3 height width"
     return logits
 
 
-def _loss(
+def _gain(
     logits: Float[Tensor, "batch classes"], goals: Int64[Tensor, "batch"], targeted: bool
 ) -> Float[Tensor, "batch"]:
-    """What an attack wants large."""
-    loss = functional.cross_entropy(logits, goals, reduction="none")
-    return -loss if targeted else loss
+    """What an attack wants large: by how much the other logits, in soft maximum, exceed the goal's; or the reverse.
+
+    It grows and falls with the cross-entropy, log(1 + exp(gain)), and has the same sign of its slope, but never goes
+    flat where float32 takes a sure answer's probability for 1.
+    """
+    goal = functional.one_hot(goals, logits.shape[1]).bool()
+    others = logits.masked_fill(goal, -torch.inf).logsumexp(dim=1)
+    gain = others - logits[goal]
+    return -gain if targeted else gain
 
 
 def _ascent(
@@ -157,6 +163,6 @@ def _ascent(
     """The sign of the slope that an attack goes up."""
     asked = images.detach().requires_grad_()
     with torch.enable_grad():
-        loss = _loss(network(asked), labels, targeted).sum()
-    (slope,) = torch.autograd.grad(loss, asked)
+        gain = _gain(network(asked), labels, targeted).sum()
+    (slope,) = torch.autograd.grad(gain, asked)
     return slope.sign()

@@ -5,7 +5,7 @@ Randomness needs no keeping, since every epoch draws from the seed and its own n
 
 import json
 import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Generic, TypeVar
@@ -30,12 +30,12 @@ def unfinished(out: Path) -> Path:
 class SnapshotFile(Generic[_RecordT]):
     """Where a training keeps its state, and what it is a training of; another's state is not gone on with.
 
-    ``record`` is what is noted of an epoch.
+    ``record`` makes what is noted of an epoch from its values by name.
     """
 
     path: Path
     settings: Mapping[str, object]
-    record: type[_RecordT]
+    record: Callable[..., _RecordT]
 
     def save(self, network: nn.Module, optimizer: torch.optim.Optimizer, history: Sequence[_RecordT]) -> None:
         """Replace the state by that after the last epoch of ``history``."""

@@ -28,13 +28,13 @@ def decode_picture(data: bytes) -> UInt8[np.ndarray, "height width 3"]:
 def resize_picture(
     image_bgr_u8: UInt8[np.ndarray, "rows columns *colours"], config: ImagePreprocessConfig
 ) -> UInt8[np.ndarray, "height width 3"]:
-    """Red, green, blue at the size that the network sees; a grey picture, [rows, columns], is taken for its colours.
+    """Red, green, blue at the size that the network sees; a grey picture, of one colour, is taken for three equal ones.
 
     Shrunk by area, so that no pixel is left out; enlarged along lines. Raises RecordingError for other channels.
     """
-    if image_bgr_u8.ndim == 2:
-        image_bgr_u8 = np.repeat(image_bgr_u8[:, :, None], 3, axis=2)
-    if image_bgr_u8.ndim != 3 or image_bgr_u8.shape[2] != 3 or not image_bgr_u8.size:
+    if image_bgr_u8.ndim == 2 or image_bgr_u8.shape[2] == 1:
+        image_bgr_u8 = np.repeat(image_bgr_u8.reshape(*image_bgr_u8.shape[:2], 1), 3, axis=2)
+    if image_bgr_u8.shape[2] != 3 or not image_bgr_u8.size:
         raise RecordingError(f"a picture of shape {list(image_bgr_u8.shape)}; [height, width, 3] or grey is needed")
     rows, columns = image_bgr_u8.shape[:2]
     if (rows, columns) != (config.height, config.width):

@@ -36,12 +36,9 @@ def vision_curve_png(history: Sequence[VisionEpoch], title: str) -> bytes:
     accuracy.set_ylim(0.0, 1.02)
     accuracy.yaxis.set_major_formatter(PercentFormatter(1.0, decimals=0))
     loss.legend(loc="upper right", frameon=False)
-    accuracy.legend(
-        [f"training: {history[-1].train_accuracy:.1%}", f"validation: {history[-1].val_accuracy:.1%}"],
-        handles=accuracy.get_lines(),
-        loc="lower right",
-        frameon=False,
-    )
+    last = history[-1]
+    said = [f"training: {last.train_accuracy:.1%}", f"validation: {last.val_accuracy:.1%}"]
+    accuracy.legend(accuracy.get_lines(), said, loc="lower right", frameon=False)
     figure.suptitle(title)
     picture = io.BytesIO()
     figure.savefig(picture, format="png", dpi=120)

@@ -62,4 +62,4 @@ def _images(folder: Path, pictures: PictureSet, preprocess: ImagePreprocessConfi
         except RecordingError as error:
             where = f"{pictures.recordings[place]} at {pictures.stamps_ns[place]} ns"
             raise DatasetError(f"{folder}: {where}: {error}; build the data set again") from None
-    return ImageSet(images_u8, pictures.labels)
+    return ImageSet(images_u8, pictures.labels.copy())  # torch wants arrays that may be written to
