@@ -35,7 +35,9 @@ def record() -> None:
 @app.command("scene", epilog=KEYS_HELP)
 def scene(
     out: Annotated[Path | None, typer.Option(help="The recording to write; it must not exist.")] = None,
-    scenario: Annotated[str, typer.Option(help="Name or TOML file of a scenario, or 'practice'.")] = "plain",
+    scenario: Annotated[
+        str, typer.Option(help="Name or TOML file of a scenario, or a practice family, as 'practice'.")
+    ] = "plain",
     seed: Annotated[int, typer.Option(min=0, help="Everything random comes from it.")] = 0,
     seconds: Annotated[
         float | None, typer.Option(min=0.02, help="How long to record, a take; without, until the scenario ends.")

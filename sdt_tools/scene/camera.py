@@ -10,7 +10,7 @@ from sdt_tools.frames import Gesture, Pose2D
 from sdt_tools.scene.layout import AS_EVER, Behaviour, Layout, Manner
 from sdt_tools.scene.rendering.figure import Figure
 from sdt_tools.scene.rendering.furniture import build_furniture
-from sdt_tools.scene.rendering.light import light_over
+from sdt_tools.scene.rendering.light import light_over, roof_over
 from sdt_tools.scene.rendering.mesh import join
 from sdt_tools.scene.rendering.person import draw_person
 from sdt_tools.scene.rendering.photometry import take_picture
@@ -19,12 +19,17 @@ from sdt_tools.scene.rendering.projection import CameraMount, Pinhole, view_from
 from sdt_tools.scene.rendering.props import HANDY, build_props
 from sdt_tools.scene.rendering.raster import draw
 from sdt_tools.scene.rendering.room import build_room
+from sdt_tools.scene.rendering.shadow import shadow_of
+from sdt_tools.scene.rendering.skyline import build_skyline
 from sdt_tools.scene.rendering.texture import TextureBank
+from sdt_tools.scene.rendering.video import VideoCamera, draw_style
 from sdt_tools.scene.seeds import Stream, generator
 
 _FRAMES: Final = 1_000_003
 """More frames than one recording has, so that no two seeds share their noise."""
 
+_HEIGHTS_M: Final[dict[str | None, tuple[float, float]]] = {"outdoor": (0.9, 2.4), "garage": (2.1, 2.7)}
+"""Of the walls where they carry no ceiling of a room: fences, and garages."""
 _IN_HAND: Final = 0.15
 """How far into a behaviour what belongs to it is in the hand: taken out of a pocket, picked up."""
 
@@ -46,9 +51,16 @@ class SceneCamera:
         of_room, of_person, of_light = generator(self._seed, Stream.CAMERA).spawn(3)
         bounds = _bounds_m(layout)
         ceiling_m = float(of_room.uniform(2.5, 3.6))
-        self._light = light_over(layout.light if light is None else light, bounds, ceiling_m, of_light)
+        roof = roof_over(layout.walls) if layout.surroundings == "garage" and layout.walls else None
+        name = layout.light if light is None else light
+        self._light = light_over(name, bounds, ceiling_m, of_light, layout.sun, roof)
+        height_m = ceiling_m
+        if layout.surroundings in _HEIGHTS_M:
+            height_m = float(of_light.uniform(*_HEIGHTS_M[layout.surroundings]))
         bank = TextureBank()
-        room, room_rims = build_room(layout.walls, bounds, ceiling_m, self._light, bank, of_room)
+        room, room_rims = build_room(layout.walls, bounds, height_m, self._light, bank, of_room)
+        if layout.surroundings in _HEIGHTS_M:
+            room = join([room, build_skyline(bounds, self._light, bank, of_light)])
         furniture, furniture_rims = build_furniture(layout.boxes, layout.posts, self._light, bank, of_room)
         plan = layout.operator
         person = draw_person(of_person, plan.leg_separation_m, plan.leg_radius_m, layout.mask)
@@ -58,6 +70,11 @@ class SceneCamera:
         self._props = build_props(person, self._figure.joints, bank, of_person) if holds else {}
         self._solids = join([furniture, room])
         self._rims = join([room_rims, furniture_rims])
+        self._video = None
+        if layout.camera == "video":
+            self._video = VideoCamera(draw_style(not self._light.kind.outdoors, of_light), self.calibration)
+            if roof is None:
+                self._rims = join([self._rims, shadow_of(furniture.points_m, furniture.triangles, self._light)])
         self._textures = bank.pack()
         shape = (self.calibration.height, self.calibration.width)
         self._radiance = np.zeros((*shape, 3), np.float32)
@@ -74,15 +91,22 @@ class SceneCamera:
         time_s: float = 0.0,
         frame: int = 0,
         manner: Manner = AS_EVER,
+        turn_radps: float = 0.0,
     ) -> UInt8[np.ndarray, "480 640 3"]:
         """The picture (blue, green, red) from a robot whose centre is at ``robot``.
 
         ``gait_phase`` in radians and ``gait_amplitude`` (0 to 1) are the walker's; ``gesture_phase`` runs from 0, arms
         down, to 1, gesture or behaviour made, in its ``manner``; ``time_s`` is for the small movements of one who
-        stands; ``frame`` for the noise.
+        stands; ``frame`` for the noise. A video camera also sees that it turns, and at what ``time_s``: its exposure is
+        on the way from its last picture's; one that goes back in time begins anew.
         """
         self._draw(robot, operator, gait_phase, gait_amplitude, gesture, gesture_phase, time_s, manner)
-        return take_picture(self._radiance, self._light.kind, (self._seed * _FRAMES + frame) % 2**63)
+        noise_key = (self._seed * _FRAMES + frame) % 2**63
+        if self._video is None:
+            return take_picture(self._radiance, self._light.kind, noise_key)
+        view = view_from(robot, self.mount)
+        buffers = (self._radiance, self._inverse_depth)
+        return self._video.take(*buffers, self._light, view, turn_radps, time_s, noise_key)
 
     def depth(
         self,
@@ -125,7 +149,11 @@ class SceneCamera:
         view = view_from(robot, self.mount)
         self._radiance[:] = 0.0
         self._inverse_depth[:] = 0.0
-        for mesh in (figure, self._solids, self._rims, shade):
+        meshes = [figure, self._solids, self._rims, shade]
+        roof = self._light.roof
+        if self._video is not None and not (roof is not None and roof.covers(operator.x_m, operator.y_m)):
+            meshes.append(shadow_of(figure.points_m, figure.triangles, self._light))
+        for mesh in meshes:
             draw(mesh, self._textures, view, self.calibration, self._radiance, self._inverse_depth)
 
 

@@ -51,6 +51,7 @@ class SceneFilm:
                 time_s,
                 self._taken,
                 arms.manner,
+                math.remainder(world.robot.yaw_rad - robot_before.yaw_rad, 2 * math.pi) / STEP_S,
             )
             self._taken += 1
             yield RawPicture(stamp_ns, stamp_ns, picture)

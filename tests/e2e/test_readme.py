@@ -30,6 +30,9 @@ SMALLER = {
     "seq 0 39": "seq 0 9",
     "--out analysis/practice\n": "--out analysis/practice --val-share 0.5\n",
     "--out analysis/my_follow": "--out analysis/my_follow --epochs 1",
+    "seq 100 159": "seq 100 103",
+    "--seconds 30": "--seconds 9",
+    "--out analysis/gestures": "--out analysis/gestures --val-share 0.5",
     "--seeds 1000-1019": "--seeds 1000-1001",
     "--out analysis/my_certified\n": "--out analysis/my_certified --epochs 2 --delta 1000\n",
     "--export analysis/my_certified_onnx": "--export analysis/my_certified_onnx --restarts 1 --steps 1",
@@ -58,7 +61,7 @@ def workplace(tmp_path: Path) -> Path:
 
 
 def test_the_commands_run_in_the_order_they_are_given(workplace: Path) -> None:
-    assert len(blocks()) == 7
+    assert len(blocks()) == 8
     script = "".join(blocks())
     for said, small in SMALLER.items():
         script = script.replace(said, small)
@@ -71,6 +74,11 @@ def test_the_commands_run_in_the_order_they_are_given(workplace: Path) -> None:
 def test_the_scenario_can_be_played(tmp_path: Path) -> None:
     (tmp_path / "my_room.toml").write_text(toml_with("mirror ="))
     assert {layout_for(str(tmp_path / "my_room.toml"), seed).name for seed in range(20)} == {"my_room"}
+
+
+def test_the_yard_can_be_played(tmp_path: Path) -> None:
+    (tmp_path / "my_yard.toml").write_text(toml_with("camera ="))
+    assert layout_for(str(tmp_path / "my_yard.toml"), 3).camera == "video"
 
 
 def test_the_domains_can_be_loaded(tmp_path: Path) -> None:

@@ -67,7 +67,7 @@ kinds = {
         st.booleans(),
         st.none() | st.sampled_from(MotionClass),
     ),
-    OperatorState: st.builds(OperatorState, stamps, st.sampled_from(Gesture), st.sampled_from(Mode)),
+    OperatorState: st.builds(OperatorState, stamps, st.sampled_from(Gesture), st.sampled_from(Mode), words),
     LogEntry: st.builds(LogEntry, stamps, st.sampled_from(LogLevel), words, words),
 }
 messages = st.one_of(*kinds.values())

@@ -90,7 +90,7 @@ def _one_arm(person: Person, does: Behaviour, manner: Manner, side: float, beat_
         height = 0.66 + 0.5 * manner.raise_rad
         return _reach(person, side, (0.17, 0.20 + 0.045 * wave, min(0.76, max(0.56, height))), _ELBOW_DOWN, 0.2)
     aside = 0.3 * manner.elbow_rad / 0.11 if does is Behaviour.POINT_AHEAD else 1.15 + manner.forward_rad
-    rise = -0.02 + 0.9 * manner.raise_rad
+    rise = (-0.12 if does is Behaviour.POINT_AHEAD else -0.02) + 0.9 * manner.raise_rad
     direction = _unit(math.cos(aside) * math.cos(rise), side * math.sin(aside) * math.cos(rise), math.sin(rise))
     bent = _unit(float(direction[0]) + 0.08, float(direction[1]), float(direction[2]) + 0.06)
     return ArmPosture(direction, bent, 1.1)

@@ -35,7 +35,8 @@ class Figure:
         bare = carry(skin, bones)
         direction, strength = light.around(np.array([place.x_m, place.y_m, 0.6 * self.person.height_m]))
         facing = np.maximum((bare.normals @ direction + _WRAP) / (1 + _WRAP), 0.0)
-        around = light.kind.ambient * (0.85 + 0.3 * bare.normals[:, 2])
+        ambient = light.ambient_at(np.array([place.x_m, place.y_m, 1.0]))
+        around = ambient * (0.85 + 0.3 * bare.normals[:, 2])
         lit = bare.lit(skin.openness * (around + strength * facing))
         feet = [
             self._shade_under(bones.rotations[foot] @ self.joints.at_m[foot] + bones.translations_m[foot], place)

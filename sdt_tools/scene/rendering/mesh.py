@@ -16,6 +16,8 @@ DECAL: Final = 2
 """Lies on another surface and wins over it."""
 SHADE: Final = 4
 """Is not painted: multiplies what lies under it by its light. Belongs at the end of a mesh."""
+CAST: Final = 8
+"""As SHADE, but no pixel is darkened twice: the shadow of many triangles on one plane. Belongs behind all SHADE."""
 
 
 Vector = Float64[np.ndarray, "3"]

@@ -4,7 +4,7 @@ from typing import Final, no_type_check
 
 import cv2
 import numpy as np
-from jaxtyping import Float32, Int8, UInt8
+from jaxtyping import Float32, Float64, Int8, UInt8
 from numba import njit
 
 from sdt_tools.scene.rendering.light import LightKind
@@ -37,25 +37,45 @@ _TONE_CURVE: Final = (_TONE + 0.5).astype(np.float32)
 """From linear light in steps to 8-bit codes, half a code up, so that cutting off rounds."""
 
 
+def metered_light(radiance: Float32[np.ndarray, "height width 3"]) -> float:
+    """The mean light of a picture, as a camera meters it."""
+    return float(radiance[::8, ::8].mean())
+
+
+def exposure_for(metered: float) -> float:
+    """The exposure that the camera would settle at, of full scale for unit light."""
+    return float((_TARGET / max(metered, 1e-3)) ** _ADAPTS)
+
+
 def take_picture(
     radiance: Float32[np.ndarray, "height width 3"], kind: LightKind, noise_key: int
 ) -> UInt8[np.ndarray, "height width 3"]:
     """The picture of ``radiance``; ``noise_key`` chooses the noise."""
     tint = np.array(kind.tint_bgr)
-    metered = float(radiance[::8, ::8].mean()) * kind.gain
-    exposure = kind.gain * (_TARGET / max(metered, 1e-3)) ** _ADAPTS
+    exposure = kind.gain * exposure_for(metered_light(radiance) * kind.gain)
     soft = cv2.GaussianBlur(radiance, (3, 3), _LENS_SIGMA_PX)
     noise = kind.noise_codes * max(1.0, exposure / kind.gain) ** 0.5
+    return develop(soft, exposure * tint, noise, noise_key, np.ones(len(radiance)))
+
+
+def develop(
+    radiance: Float32[np.ndarray, "height width 3"],
+    gains: Float64[np.ndarray, "3"],
+    noise_codes: float,
+    noise_key: int,
+    row_gains: Float64[np.ndarray, "height"],
+) -> UInt8[np.ndarray, "height width 3"]:
+    """8-bit colours of ``radiance`` times ``gains`` (a colour) and ``row_gains``, with noise of that deviation."""
     picture = np.empty(radiance.shape, np.uint8)
-    _develop(
-        soft, (exposure * tint).astype(np.float32), np.float32(noise / 16), noise_key, _TONE_CURVE, _NOISE, picture
-    )
+    scale = np.float32(noise_codes / 16)
+    rows = row_gains.astype(np.float32)
+    _develop(radiance, gains.astype(np.float32), scale, noise_key, _TONE_CURVE, _NOISE, rows, picture)
     return picture
 
 
 @njit(cache=True, error_model="numpy")
 @no_type_check
-def _develop(radiance, gains, noise_scale, noise_key, curve, noise, picture):
+def _develop(radiance, gains, noise_scale, noise_key, curve, noise, row_gains, picture):
     height, width, _ = radiance.shape
     middle_x, middle_y = np.float32((width - 1) / 2), np.float32((height - 1) / 2)
     falloff = np.float32(_CORNER_LOSS) / (middle_x * middle_x + middle_y * middle_y)
@@ -74,8 +94,9 @@ def _develop(radiance, gains, noise_scale, noise_key, curve, noise, picture):
         light, row = radiance[y].ravel(), picture[y].ravel()
         down = np.float32(y) - middle_y
         kept = np.float32(1.0) - falloff * down * down
+        brighter = row_gains[y]
         for i in range(3 * width):
-            step[i] = np.int32(min(light[i] * (gain[i] * kept - loss[i]), np.float32(_STEPS - 1)))
+            step[i] = np.int32(min(light[i] * brighter * (gain[i] * kept - loss[i]), np.float32(_STEPS - 1)))
         for i in range(3 * width):
             codes[i] = curve[step[i]]
         for i in range(3 * width):

@@ -12,13 +12,17 @@ import numpy as np
 from jaxtyping import Float32
 from numba import njit
 
-from sdt_tools.scene.rendering.mesh import DECAL, ONE_SIDED, SHADE, Mesh
+from sdt_tools.scene.rendering.mesh import CAST, DECAL, ONE_SIDED, SHADE, Mesh
 from sdt_tools.scene.rendering.projection import Pinhole, View
 from sdt_tools.scene.rendering.texture import FULL, LANE_BITS, TexturePack
 
 _NEAR_M: Final = 0.05
 _DECAL_LIFT: Final = 1.004
 """A decal is drawn this much nearer than it is: 0.4 % of its distance."""
+_ON_IT: Final = 0.996
+"""What is farther than this share of a shadow's 1/z does not lie under it."""
+_CAST_LIFT: Final = 1.0042
+"""What has a shadow on it counts as this much nearer than it is, so that it gets none again."""
 _BLOCK: Final = 8
 _BLOCK_SHARES: Final = 1.0 / np.maximum(np.arange(_BLOCK + 1), 1)
 _LEVEL_STEP: Final = 4.0 ** (-1.0 / 3.0)
@@ -87,8 +91,9 @@ def _draw(points, uv, light, triangles, texture, flags, texels, offsets, sizes, 
         scale = 1.0 / determinant
         inverse_z = _plane(u, v, w, scale, scale, scale, lens)
         brightness = _plane(u, v, w, light[i] * scale, light[j] * scale, light[k] * scale, lens)
-        if flag & SHADE:
-            _shade(outline_x, outline_y, corners, rows, inverse_z, brightness, radiance, inverse_depth)
+        if flag & (SHADE | CAST):
+            lift = _CAST_LIFT if flag & CAST else 0.0
+            _shade(outline_x, outline_y, corners, rows, inverse_z, brightness, lift, radiance, inverse_depth)
             continue
         kind = texture[number]
         side = sizes[kind]
@@ -178,14 +183,18 @@ def _paint(
 
 @njit(cache=True, error_model="numpy")
 @no_type_check
-def _shade(outline_x, outline_y, corners, rows, inverse_z_plane, brightness_plane, radiance, inverse_depth):
-    """Multiply what lies on or behind the outline by its light."""
+def _shade(outline_x, outline_y, corners, rows, inverse_z_plane, brightness_plane, lift, radiance, inverse_depth):
+    """Multiply what lies on or behind the outline by its light; with a ``lift``, what lies on it alone, and once."""
     width = inverse_depth.shape[1]
     for y in range(rows[0], rows[1]):
         start, stop = _span(outline_x, outline_y, corners, y, width)
         for x in range(start, stop):
             inverse_z = inverse_z_plane[0] + inverse_z_plane[1] * x + inverse_z_plane[2] * y
+            if lift > 0.0 and inverse_depth[y, x] < inverse_z * _ON_IT:
+                continue
             if inverse_z * _DECAL_LIFT > inverse_depth[y, x]:
+                if lift > 0.0:
+                    inverse_depth[y, x] = inverse_z * lift
                 factor = (brightness_plane[0] + brightness_plane[1] * x + brightness_plane[2] * y) / inverse_z
                 for channel in range(3):
                     radiance[y, x, channel] *= np.float32(factor)

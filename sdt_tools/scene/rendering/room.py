@@ -9,7 +9,7 @@ from jaxtyping import Float64
 from sdt_tools.frames import MAX_RANGE_M
 from sdt_tools.scene.layout import Wall
 from sdt_tools.scene.rendering import paint
-from sdt_tools.scene.rendering.light import Light
+from sdt_tools.scene.rendering.light import Light, Roof
 from sdt_tools.scene.rendering.mesh import DECAL, ONE_SIDED, Mesh, join, panel, vector
 from sdt_tools.scene.rendering.texture import TextureBank
 from sdt_tools.scene.rendering.wall import WallPaint, build_wall, draw_wall_paint
@@ -35,6 +35,8 @@ def build_room(
     wall_paint = draw_wall_paint(bank, rng)
     if light.kind.outdoors:
         parts.append(_sky(bounds_m, bank))
+        if light.roof is not None:
+            parts += [_slab(light.roof, light, bank, rng), _underside(light.roof, height_m, light, bank, rng)]
     else:
         parts += _ceiling(bounds_m, hall, height_m, light, bank, rng)
         bare = WallPaint(wall_paint.base, wall_paint.bands)
@@ -162,6 +164,40 @@ def _ceiling(
             )
             parts.append(lamp.lit(np.full(4, brightness)))
     return parts
+
+
+def _slab(roof: Roof, light: Light, bank: TextureBank, rng: np.random.Generator) -> Mesh:
+    """The concrete under a roof, thin enough that what is darkened of the floor is darkened of it too."""
+    x0, y0, x1, y1 = roof.rectangle_m
+    cells = np.linspace(0.0, 1.0, 13)
+    slab = panel(
+        vector(x0, y0, 0.001),
+        vector(x1 - x0, 0.0, 0.0),
+        vector(0.0, y1 - y0, 0.0),
+        cells,
+        cells,
+        ((x1 - x0) / _TILE_M, (y1 - y0) / _TILE_M),
+        bank.add(paint.concrete(rng, paint.color_hsv(rng.uniform(0, 360), 0.04, rng.uniform(0.35, 0.65)))),
+        ONE_SIDED,
+    )
+    return slab.lit(light.at(slab.points_m, slab.normals))
+
+
+def _underside(roof: Roof, height_m: float, light: Light, bank: TextureBank, rng: np.random.Generator) -> Mesh:
+    """What is seen of a roof from below."""
+    x0, y0, x1, y1 = roof.rectangle_m
+    grey = paint.color_hsv(rng.uniform(0, 360), 0.04, rng.uniform(0.4, 0.8))
+    whole = np.linspace(0.0, 1.0, 9)
+    ceiling = panel(
+        vector(x0, y0, height_m),
+        vector(0.0, y1 - y0, 0.0),
+        vector(x1 - x0, 0.0, 0.0),
+        whole,
+        whole,
+        ((y1 - y0) / _TILE_M, (x1 - x0) / _TILE_M),
+        bank.add(paint.concrete(rng, grey)),
+    )
+    return ceiling.lit(0.8 * light.at(ceiling.points_m * (1, 1, 0), -ceiling.normals))
 
 
 def _sky(bounds_m: Float64[np.ndarray, "4"], bank: TextureBank) -> Mesh:

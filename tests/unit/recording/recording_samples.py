@@ -69,7 +69,7 @@ def one_of_each(stamp_ns: int = T0) -> list[Received]:
         CameraImage(stamp_ns, b"\xff\xd8not really a picture\xff\xd9"),
         Odometry(stamp_ns, Pose2D(1.5, -2.0, 0.25)),
         OperatorPose(stamp_ns, Pose2D(3.0, 0.5, -3.0)),
-        OperatorState(stamp_ns, Gesture.DISABLE, Mode.ACTIVE),
+        OperatorState(stamp_ns, Gesture.DISABLE, Mode.ACTIVE, "phone_call"),
         MotionCommand(stamp_ns, MotionClass.LEFT_BACKWARD, Twist(-0.25, 0.9), "expert", expert=MotionClass.STAY),
         LogEntry(stamp_ns, LogLevel.WARNING, "a gap", "lidar"),
     ]

@@ -11,8 +11,8 @@ from PIL import Image
 from sdt_tools.errors import ConfigError
 from sdt_tools.frames import Gesture, Pose2D
 from sdt_tools.recording.live.encoder import encode_jpeg
-from sdt_tools.scene.camera import SceneCamera, gesture_of_arms
-from sdt_tools.scene.layout import Box, GestureEvent, Post, Wall
+from sdt_tools.scene.camera import SceneCamera
+from sdt_tools.scene.layout import Box, Post, Wall
 from sdt_tools.scene.rendering.light import KINDS
 
 FACING = Pose2D(1.6, 0.1, math.pi)
@@ -158,23 +158,3 @@ def test_a_jpeg_is_the_picture_for_another_decoder() -> None:
     assert read.shape == (480, 640, 3)
     assert np.sqrt(((read - picture) ** 2).mean()) < 8
     assert len(encode_jpeg(picture, quality=40)) < len(data) < 120_000
-
-
-@pytest.mark.parametrize(
-    ("time_s", "expected"),
-    [
-        (0.0, (Gesture.IDLE, 1.0)),
-        (1.0, (Gesture.ENABLE, 0.0)),
-        (1.3, (Gesture.ENABLE, 0.5)),
-        (2.0, (Gesture.ENABLE, 1.0)),
-        (3.3, (Gesture.ENABLE, 0.5)),
-        (4.0, (Gesture.ENABLE, 0.0)),
-        (9.0, (Gesture.DISABLE, 1.0)),
-    ],
-)
-def test_arms_follow_the_gestures_of_the_layout(time_s: float, expected: tuple[Gesture, float]) -> None:
-    gestures = (GestureEvent(1.0, Gesture.ENABLE, 2.0), GestureEvent(8.0, Gesture.DISABLE, 2.0))
-
-    gesture, share = gesture_of_arms(gestures, time_s)
-
-    assert (gesture, pytest.approx(share)) == expected

@@ -125,10 +125,9 @@ def _routes(bag: Bag, wanted: Wanted) -> Routes:
 
 
 def _messages(bag: Bag, routes: Routes, taking: Taking, tally: _Tally) -> Iterator[Carried]:
-    store = types.type_store()
     for topic, type_name, received_ns, data in bag.messages(routes.taken):
         try:
-            message: Any = store.deserialize_cdr(data, type_name)
+            message: Any = types.decoded(data, type_name)
         except SerdeError:
             tally.unreadable[topic] += 1
             continue

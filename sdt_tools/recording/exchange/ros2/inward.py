@@ -174,6 +174,7 @@ def _transforms(message: Any) -> Iterator[_Built]:
 def _operator_state(state: Any) -> Iterator[_Built]:
     built = _new(topics.OPERATOR_STATE)
     built.gesture, built.commanded_mode = state.gesture, state.commanded_mode
+    built.behaviour = state.behaviour
     yield topics.OPERATOR_STATE, stamp_of(state.header.stamp), built
 
 

@@ -152,6 +152,7 @@ def _operator_state(stamp_ns: int, state: Any) -> Iterator[Sent]:
         header=header(stamp_ns, ""),
         gesture=state.gesture,
         commanded_mode=state.commanded_mode,
+        behaviour=state.behaviour,
     )
     yield Sent(OPERATOR_STATE, types.OPERATOR_STATE, message)
 

@@ -7,6 +7,7 @@ definition in the bag, so that readers without the package understand them as we
 from functools import cache
 from typing import Any, Final
 
+from rosbags.serde import SerdeError
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 from rosbags.typesys.store import Typestore
 
@@ -24,6 +25,8 @@ TF_MESSAGE: Final = "tf2_msgs/msg/TFMessage"
 LOG: Final = "rcl_interfaces/msg/Log"
 MOTION_COMMAND: Final = "sdt_msgs/msg/MotionCommand"
 OPERATOR_STATE: Final = "sdt_msgs/msg/OperatorState"
+_OLD_OPERATOR_STATE: Final = "sdt_msgs/msg/OperatorStateWithoutBehaviour"
+"""What older bags hold as ``OPERATOR_STATE``."""
 
 NO_EXPERT: Final = -1
 
@@ -42,6 +45,12 @@ int8 expert
 std_msgs/Header header
 uint8 gesture
 uint8 commanded_mode
+string behaviour
+""",
+    _OLD_OPERATOR_STATE: """\
+std_msgs/Header header
+uint8 gesture
+uint8 commanded_mode
 """,
 }
 """Numbers are those of ``sdt_tools.frames``; an ``expert`` of -1 is none."""
@@ -54,6 +63,24 @@ def type_store() -> Typestore:
     for name, definition in _OWN.items():
         store.register(get_types_from_msg(definition, name))
     return store
+
+
+def decoded(data: bytes, type_name: str) -> Any:
+    """The message of ``type_name`` that ``data`` holds. Raises SerdeError where it holds none."""
+    store = type_store()
+    try:
+        return store.deserialize_cdr(data, type_name)
+    except SerdeError:
+        if type_name != OPERATOR_STATE:
+            raise
+        old: Any = store.deserialize_cdr(data, _OLD_OPERATOR_STATE)
+        return new(
+            OPERATOR_STATE,
+            header=old.header,
+            gesture=old.gesture,
+            commanded_mode=old.commanded_mode,
+            behaviour="",
+        )
 
 
 def new(type_name: str, **fields: object) -> Any:
