@@ -9,7 +9,7 @@ from typing import Final
 import numpy as np
 import polars as pl
 import torch
-from jaxtyping import Float32, Int64, UInt8
+from jaxtyping import Bool, Float32, Int64, UInt8
 from torch import Tensor
 
 from sdt_tools.errors import DatasetError, OutputExistsError
@@ -75,16 +75,18 @@ def attack_vision(
 ) -> tuple[VisionAttackSummary, ImageExhibit]:
     """Attack ``count`` of the images, as many of each gesture, by both methods at every ε; write it to ``out``.
 
-    Of ``config`` count the steps, restarts and seed. Raises OutputExistsError, and DatasetError where no image of a
-    disabling operator is answered rightly, so that there is nothing to show.
+    Of ``config`` count the steps, restarts and seed. Shown is a disable image that is answered rightly, if there is
+    one. Raises OutputExistsError, and DatasetError where there is no image of disable at all.
     """
     if out.exists():
         raise OutputExistsError(out)
     chosen = _chosen(labels, count, config.seed)
     right = chosen[model.predict_logits(images_u8[chosen]).argmax(axis=1) == labels[chosen]]
-    disabling = right[labels[right] == Gesture.DISABLE]
+    disabling = chosen[labels[chosen] == Gesture.DISABLE]
     if not len(disabling):
-        raise DatasetError(f"{model.name} answers no image of disable rightly, so that none can be turned; try others")
+        raise DatasetError("no image of disable among the validation images, so that none can be turned into enable")
+    counted = disabling[np.isin(disabling, right)]
+    disabling = counted if len(counted) else disabling
     report = progress or _no_progress
     rates: list[AttackRate] = []
     tables: list[pl.DataFrame] = []
@@ -95,7 +97,7 @@ def attack_vision(
         places = right if aim is None else disabling
         asked = config.model_copy(update={"method": method, "epsilon": epsilon})
         found = attack_images(model.network, _tensor(images_u8[places]), torch.from_numpy(labels[places]), asked, aim)
-        rates.append(_rate(method, epsilon, aim, found))
+        rates.append(_rate(method, epsilon, aim, found.succeeded.numpy()[np.isin(places, right)]))
         tables.append(_table(method, epsilon, aim, places, labels, found))
         if aim is not None and method == "pgd":  # of the larger ε, which comes last, is shown
             exhibit = _exhibit(model, images_u8[places], found, epsilon)
@@ -125,8 +127,8 @@ def _tensor(images_u8: UInt8[np.ndarray, "images height width 3"]) -> UInt8[Tens
     return torch.from_numpy(images_u8).permute(0, 3, 1, 2)
 
 
-def _rate(method: Method, epsilon: int, aim: Gesture | None, found: ImageAttackResult) -> AttackRate:
-    images, succeeded = len(found.succeeded), int(found.succeeded.sum())
+def _rate(method: Method, epsilon: int, aim: Gesture | None, turned: Bool[np.ndarray, "images"]) -> AttackRate:
+    images, succeeded = len(turned), int(turned.sum())
     source, target = ("any", "any other") if aim is None else (Gesture.DISABLE.label, aim.label)
     return AttackRate(method, epsilon, source, target, images, succeeded, wilson(succeeded, images))
 

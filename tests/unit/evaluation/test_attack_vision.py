@@ -85,7 +85,7 @@ def test_existing_output_and_the_wrong_network_are_refused(model: Path, dataset:
         run(model, tmp_path / "none")
 
 
-def test_a_network_that_never_says_disable_has_nothing_to_show(model: Path, dataset: Path, tmp_path: Path) -> None:
+def test_without_images_of_disable_there_is_nothing_to_show(model: Path, dataset: Path, tmp_path: Path) -> None:
     from sdt_tools.evaluation.attack_vision import attack_vision
     from sdt_tools.robustness.image_attacks import ImageAttackConfig
 
