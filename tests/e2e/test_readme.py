@@ -35,7 +35,7 @@ SMALLER = {
     "--out analysis/gestures": "--out analysis/gestures --val-share 0.5",
     "--out analysis/my_vision": "--out analysis/my_vision --epochs 1 --width 64 --height 48",
     "--out analysis/my_careful_vision": "--out analysis/my_careful_vision --epochs 1 --width 64 --height 48",
-    "attack vision analysis/my_vision analysis/gestures": "attack vision analysis/my_vision analysis/gestures --images 6",
+    "analysis/my_vision analysis/gestures": "analysis/my_vision analysis/gestures --images 6 --steps 1",
     "--seeds 1000-1019": "--seeds 1000-1001",
     "--out analysis/my_certified\n": "--out analysis/my_certified --epochs 2 --delta 1000\n",
     "--export analysis/my_certified_onnx": "--export analysis/my_certified_onnx --restarts 1 --steps 1",

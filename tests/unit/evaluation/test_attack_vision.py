@@ -1,13 +1,13 @@
 """An attack on a small vision network, from the command to the pictures."""
 
 import json
-import sys
 from pathlib import Path
 
 import cv2
 import numpy as np
 import polars as pl
 import pytest
+from corner_gestures import TINY_CONFIG, draw_data, write_dataset
 from rerun.chunk import RrdReader
 from typer.testing import CliRunner
 
@@ -15,11 +15,6 @@ from sdt_tools.cli.attack import app
 from sdt_tools.errors import CheckpointError, DatasetError, OutputExistsError
 from sdt_tools.models.vision.checkpoint import load_vision_checkpoint
 from sdt_tools.robustness.image_figure import magnified_mask, probabilities
-
-sys.path.append(str(Path(__file__).parents[1] / "training/vision"))
-
-from corner_gestures import TINY_CONFIG, draw_data, write_dataset
-
 from sdt_tools.training.vision.train import train_vision
 
 
