@@ -5,7 +5,7 @@ from typing import Annotated
 
 import typer
 
-from sdt_tools.cli import errors_claims, errors_compare
+from sdt_tools.cli import errors_claims, errors_compare, errors_selftest, errors_suspects
 from sdt_tools.cli.console import JsonFlag, console, emit, print_incomplete
 from sdt_tools.cli.default_command import WithDefault
 
@@ -18,11 +18,15 @@ app = typer.Typer(
 
 app.command("claims")(errors_claims.command)
 app.command("compare")(errors_compare.command)
+app.command("selftest")(errors_selftest.command)
 
 
 @app.callback()
 def errors() -> None:
     """Say of every wrong frame why it is wrong. Without a sub-command named: analyse."""
+
+
+app.command("suspects")(errors_suspects.command)
 
 
 @app.command("analyse")
@@ -32,7 +36,7 @@ def analyse(
         list[Path],
         typer.Option("--recordings", help="The replayed recordings, or folders of them; may be given several times."),
     ],
-    out: Annotated[Path, typer.Option(help="Folder to write: tags.parquet, errors.json, figures.")],
+    out: Annotated[Path, typer.Option(help="Folder to write: report.html, tags.parquet, errors.json, figures.")],
     model: Annotated[str | None, typer.Option(help="Model, where the predictions are of several.")] = None,
     config: Annotated[Path | None, typer.Option(help="TOML file of options, such as loss, eta and epsilon_m.")] = None,
     json_output: JsonFlag = False,
@@ -77,4 +81,4 @@ def analyse(
     for warning in report.warnings:
         console.print(warning, style="yellow")
     print_incomplete(report.incomplete)
-    console.print(f"written to {out}", soft_wrap=True)
+    console.print(f"written to {out}; read {out / 'report.html'}", soft_wrap=True)

@@ -24,13 +24,14 @@ class FrameSet:
     """The frames of one split, in order of recording and time.
 
     ``ranges_m`` are as the sensor gave them, invalid codes kept; ``labels`` index the classes; ``recordings`` names the
-    recording of each frame by its file's stem.
+    recording of each frame by its file's stem, ``recording_ids`` by its id.
     """
 
     ranges_m: Float64[np.ndarray, "frames rays"]
     labels: Int64[np.ndarray, "frames"]
     stamps_ns: Int64[np.ndarray, "frames"]
     recordings: tuple[str, ...]
+    recording_ids: tuple[str, ...]
 
     def __len__(self) -> int:
         return len(self.labels)
@@ -165,6 +166,7 @@ def _frame_set(folder: Path, table: pl.DataFrame, split: str) -> FrameSet:
         labels=rows["label"].cast(pl.Int64).to_numpy(),
         stamps_ns=rows["stamp_ns"].to_numpy(),
         recordings=tuple(rows["recording"].cast(pl.String).to_list()),
+        recording_ids=tuple(rows["recording_id"].cast(pl.String).to_list()),
     )
 
 

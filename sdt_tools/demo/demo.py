@@ -18,6 +18,7 @@ from sdt_tools.demo import stages
 from sdt_tools.demo.config import DemoConfig
 from sdt_tools.demo.report import write_report
 from sdt_tools.demo.summary import DemoSummary
+from sdt_tools.error_analysis.analyse import PAGE
 from sdt_tools.evaluation.evaluate import EvaluationSummary, evaluate_follow
 from sdt_tools.evaluation.figure import runs_figure
 from sdt_tools.evaluation.saving import SaveRuns
@@ -56,7 +57,7 @@ def run_demo(out: Path, config: DemoConfig, workers: int, progress: StageProgres
     predictions = execute(Unit("replay", stages.replay_stage, replayed), out)
     progress("error tags", 0, 1)
     analysed = {"predictions": predictions, "recordings": (*practice, *camera), "options": config.errors}
-    errors = execute(Unit("errors", stages.errors_stage, analysed), out)
+    errors = execute(Unit("errors", stages.errors_stage, analysed, {"found_at": out / "errors"}), out)
     progress("Rerun view", 0, 1)
     shown = {"recording": camera[0], "labels": labels, "predictions": predictions, "errors": errors}
     view = execute(Unit("view", stages.view_stage, shown), out)
@@ -165,7 +166,8 @@ def _figures(
         pl.read_parquet(table).filter(pl.col("policy") == name) for table in (evaluation.runs, evaluation.traces)
     )
     runs_figure(runs, traces, config.scenario, f"{stages.MODEL} in {config.scenario}", driven)
-    return {**{name: target for name, (_, target) in figures.items()}, "runs": driven}
+    page = errors / stages.ERRORS / PAGE
+    return {**{name: target for name, (_, target) in figures.items()}, "runs": driven, "page": page}
 
 
 def _summary(

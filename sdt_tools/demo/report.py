@@ -17,13 +17,13 @@ def write_report(
     trained: Mapping[str, Any],
     tagged: Mapping[str, Any],
 ) -> None:
-    """Write the report; figures are linked relative to it."""
+    """Write the report; figures, and the page about errors, are linked relative to it."""
     links = {name: figure.relative_to(path.parent) for name, figure in figures.items()}
     sections = [
         _opening(config, summary),
         _training(summary, trained, links["curve"]),
         _closed_loop(config, summary, links["runs"]),
-        _errors(tagged, links["tags"], links["epsilon"]),
+        _errors(tagged, links["tags"], links["epsilon"], links["page"]),
         _looking(path.parent, summary),
     ]
     path.write_text("\n\n".join(sections) + "\n", encoding="utf-8")
@@ -81,7 +81,7 @@ def _driven(name: str, result: Mapping[str, Any]) -> str:
     return f"| {name} | {result['ok']} of {result['runs']} | {low:.0%} to {high:.0%} |"
 
 
-def _errors(tagged: Mapping[str, Any], tags: Path, epsilon: Path) -> str:
+def _errors(tagged: Mapping[str, Any], tags: Path, epsilon: Path, page: Path) -> str:
     shares = "\n".join(
         f"| {name} | {share['count']:,} | {share['share']:.2%} | {share['low']:.2%} to {share['high']:.2%} |"
         for name, share in tagged["shares"].items()
@@ -92,6 +92,7 @@ def _errors(tagged: Mapping[str, Any], tags: Path, epsilon: Path) -> str:
     return f"""## Why frames are wrong
 
 {tagged["frames"]:,} labelled frames of {tagged["recordings"]} recordings were replayed; {tagged["errors"]:,} are wrong.
+The whole account, with examples: [{page.name}]({page}).
 
 | tag | frames | share | 95 % interval |
 |---|---:|---:|---:|

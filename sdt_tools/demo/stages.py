@@ -93,9 +93,11 @@ def replay_stage(
     )
 
 
-def errors_stage(out: Path, predictions: Path, recordings: Sequence[Path], options: ErrorOptions) -> None:
-    """Tag every wrong frame."""
-    report = analyse_errors(predictions / PREDICTIONS, recordings, options, out / ERRORS)
+def errors_stage(
+    out: Path, predictions: Path, recordings: Sequence[Path], options: ErrorOptions, found_at: Path
+) -> None:
+    """Tag every wrong frame; ``found_at`` is where the stage's folder will lie."""
+    report = analyse_errors(predictions / PREDICTIONS, recordings, options, out / ERRORS, found_at=found_at / ERRORS)
     _note(out, report.document())
 
 

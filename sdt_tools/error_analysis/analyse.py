@@ -11,8 +11,11 @@ from sdt_tools.error_analysis.definitions import ErrorOptions
 from sdt_tools.error_analysis.explain import explain
 from sdt_tools.error_analysis.labelled import load_labelled
 from sdt_tools.error_analysis.recorded import find_recordings, read_situations
-from sdt_tools.error_analysis.report.document import ErrorReport, summarise, tag_table
-from sdt_tools.error_analysis.report.figures import draw_epsilon, draw_tags
+from sdt_tools.error_analysis.report.document import ErrorReport, summarise
+from sdt_tools.error_analysis.report.examples import draw_examples
+from sdt_tools.error_analysis.report.figures import epsilon_figure, save_png, tags_figure
+from sdt_tools.error_analysis.report.page import Sources, render_page
+from sdt_tools.error_analysis.report.tags_file import tag_table, write_tags
 from sdt_tools.errors import OutputExistsError
 from sdt_tools.runs.code import code_version
 from sdt_tools.runs.local import Progress
@@ -20,6 +23,7 @@ from sdt_tools.runs.unit import content_hash
 
 TAGS: Final = "tags.parquet"
 REPORT: Final = "errors.json"
+PAGE: Final = "report.html"
 EPSILON_FIGURE: Final = "epsilon.png"
 TAGS_FIGURE: Final = "tags.png"
 
@@ -31,13 +35,15 @@ def analyse_errors(
     out: Path,
     model: str | None = None,
     progress: Progress | None = None,
+    found_at: Path | None = None,
 ) -> ErrorReport:
-    """Tag every labelled frame of ``predictions`` and write the folder ``out``: tags, report, two figures.
+    """Tag every labelled frame of ``predictions`` and write the folder ``out``: tags, report, page, two figures.
 
     ``recordings`` are MCAP files or folders of them, from which the scans are read again; ``model`` is needed where the
-    predictions are of several. ``progress`` hears of recordings read, then of error frames compared. While it works it
-    needs 2.2 kB of disk a frame beside ``out``. Raises UsageError for predictions that cannot be analysed,
-    RecordingError for recordings that are missing or others, OutputExistsError, SdtError without that room.
+    predictions are of several. ``found_at`` is where the folder will lie for good, for the commands in the page;
+    without, ``out``. ``progress`` hears of recordings read, then of error frames compared. While it works it needs
+    2.2 kB of disk a frame beside ``out``. Raises UsageError for predictions that cannot be analysed, RecordingError for
+    recordings that are missing or others, OutputExistsError, SdtError without that room.
     """
     if out.exists():
         raise OutputExistsError(out)
@@ -46,16 +52,20 @@ def analyse_errors(
     scans, incomplete = read_situations(frames, paths, options, progress, scratch=out.parent)
     explanation = explain(frames, scans, options, progress)
     report = summarise(frames, explanation, options, incomplete)
+    examples = draw_examples(frames, explanation, scans, paths, options)
     inputs = {"predictions": content_hash(predictions), "recordings": {path.stem: content_hash(path) for path in paths}}
     document = {**report.document(), "code_version": code_version(), "inputs": inputs}
+    sources = Sources(predictions, found_at or out, TAGS)
     scratch = out.with_name(f".{out.name}.{os.getpid()}.part")
     shutil.rmtree(scratch, ignore_errors=True)
     scratch.mkdir(parents=True)
     try:
-        tag_table(frames, explanation).write_parquet(scratch / TAGS)
+        write_tags(tag_table(frames, explanation), scratch / TAGS, document)
         (scratch / REPORT).write_text(json.dumps(document, indent=2, ensure_ascii=False) + "\n", "utf-8")
-        draw_epsilon(report.epsilon, scratch / EPSILON_FIGURE)
-        draw_tags(report, scratch / TAGS_FIGURE)
+        page = render_page(report, frames, explanation, examples, sources, document)
+        (scratch / PAGE).write_text(page, "utf-8")
+        save_png(epsilon_figure(report.epsilon), scratch / EPSILON_FIGURE)
+        save_png(tags_figure(report), scratch / TAGS_FIGURE)
         scratch.rename(out)
     finally:
         shutil.rmtree(scratch, ignore_errors=True)

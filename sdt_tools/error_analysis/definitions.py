@@ -36,6 +36,8 @@ class Tag(StrEnum):
     CORRECT = "correct"
 
 
+ERROR_TAGS: Final = tuple(tag for tag in Tag if tag is not Tag.CORRECT)
+
 DEFAULT_FEATURES: Final = (
     "front_range_m",
     "operator_range_m",
@@ -79,7 +81,7 @@ class ConditionOptions(Config):
     min_score: float = Field(default=12.0, ge=0.0)
     simplify: float = Field(default=0.05, ge=0.0, lt=1.0)
     permutations: int = Field(default=999, ge=99)
-    alpha: float = Field(default=0.025, gt=0.0, lt=1.0)
+    alpha: float = Field(default=0.01, gt=0.0, lt=1.0)
     implausible: float = Field(default=0.002, ge=0.0, lt=1.0)
 
 

@@ -48,9 +48,9 @@ def read_situations(
 ) -> tuple[Float32[np.ndarray, "frames rays"], tuple[Incomplete, ...]]:
     """The situation of each frame, and the recordings that are cut off or damaged.
 
-    ``paths`` are the recordings in the order of ``frames``. With ``scratch``, a folder, the situations lie in a nameless
-    file there (``scratch_scans``), else in memory. Raises RecordingError where a recording cannot be read or lacks the
-    scan of a frame.
+    ``paths`` are the recordings in the order of ``frames``. With ``scratch``, a folder, the situations lie in a
+    nameless file there (``scratch_scans``), else in memory. Raises RecordingError where a recording cannot be read or
+    lacks the scan of a frame.
     """
     total = len(frames.loss)
     scans = scratch_scans(scratch, total) if scratch else np.empty((total, RAYS), np.float32)

@@ -24,6 +24,8 @@ COLUMNS: Final[Mapping[str, type[pl.Int64] | type[pl.String]]] = {
     "created_ns": pl.Int64,
 }
 HEADER: Final = (",".join(COLUMNS) + "\n").encode()
+_UNREADABLE: Final = "the line is not UTF-8 text, or a number in it is too large"
+_LARGEST: Final = (1 << 63) - 1
 BROKEN: Final = b"#broken"
 """Closes a line that a crash broke off, so that it never turns into an act."""
 
@@ -41,10 +43,15 @@ class Acts:
     broken_lines: tuple[int, ...] = ()
 
 
+def no_acts(path: Path) -> Acts:
+    """What a journal at ``path`` would hold before the first act."""
+    return Acts(path, journal_kind(path), pl.DataFrame(schema=COLUMNS))
+
+
 def parse_journal(data: bytes, path: Path, recording_id: str | None) -> Acts:
     """A whole journal file. Raises LabelError naming ``path`` and the line; see ``parse_acts``."""
     if HEADER.startswith(data):  # also one that was broken off while its header was written
-        return Acts(path, journal_kind(path), pl.DataFrame(schema=COLUMNS))
+        return no_acts(path)
     if not data.startswith(HEADER):
         raise LabelError(f"{path}:1: the header is not '{HEADER.decode().strip()}'; this is no label journal")
     return parse_acts(data[len(HEADER) :], path, recording_id, first_line=2, after_act=0)
@@ -72,7 +79,8 @@ def parse_acts(data: bytes, path: Path, recording_id: str | None, first_line: in
         line = int(wrong["line"][0])
         row = int(fields["line"].search_sorted(line))
         before = after_act if row == 0 else int(table["act_id"][row - 1])
-        raise LabelError(f"{path}:{line}: {_explain(str(fields['text'][row]), kind, owner, before)}")
+        fault = fault_in(str(fields["text"][row]), kind, owner, before)
+        raise LabelError(f"{path}:{line}: {fault or _UNREADABLE}")
     return Acts(path, kind, table.select(list(COLUMNS)), tuple(broken))
 
 
@@ -91,14 +99,17 @@ def _is_valid(kind: LabelKind, recording_id: str | None, after_act: int) -> pl.E
     return pl.all_horizontal(check.fill_null(value=False) for check in checks)
 
 
-def _explain(text: str, kind: LabelKind, recording_id: str | None, before: int) -> str:
-    """What is wrong with the line ``text``, which follows act ``before``, and what it should be."""
+def fault_in(text: str, kind: LabelKind, recording_id: str | None, before: int) -> str | None:
+    """What is wrong with the line ``text``, which follows act ``before``, and what it should be; None for nothing.
+
+    The rules of ``parse_acts`` for a line of its own, in microseconds.
+    """
     fields = text.split(",")
     if len(fields) != len(COLUMNS):
         return f"{len(fields)} fields where {len(COLUMNS)} belong ({', '.join(COLUMNS)})"
     values = dict(zip(COLUMNS, fields, strict=True))
     for name, dtype in COLUMNS.items():
-        if dtype is pl.Int64 and not values[name].isdecimal():
+        if dtype is pl.Int64 and not (values[name].isascii() and values[name].isdecimal()):
             return f"{name} '{values[name]}' is not a whole number"
     if int(values["act_id"]) <= before:
         return f"act {values['act_id']} stands after act {before}; acts are numbered in order"
@@ -110,4 +121,6 @@ def _explain(text: str, kind: LabelKind, recording_id: str | None, before: int) 
         return f"unknown source '{values['source']}'; it is one of {', '.join(LabelSource)}"
     if not values["labeler"].strip():
         return "no labeler is named"
-    return "the line is not UTF-8 text, or a number in it is too large"
+    if any(int(values[name]) > _LARGEST for name, dtype in COLUMNS.items() if dtype is pl.Int64):
+        return _UNREADABLE
+    return None

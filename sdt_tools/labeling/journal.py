@@ -15,7 +15,7 @@ from types import TracebackType
 import polars as pl
 
 from sdt_tools.errors import LabelError
-from sdt_tools.labeling.acts import BROKEN, HEADER, Acts, parse_acts, parse_journal
+from sdt_tools.labeling.acts import BROKEN, COLUMNS, HEADER, Acts, fault_in, parse_acts, parse_journal
 from sdt_tools.labeling.vocabulary import LabelSource, journal_kind
 
 
@@ -61,18 +61,20 @@ class Journal:
         self.path = path
         self.recording_id = recording_id
         self._file: int | None = None
+        self._news: list[pl.DataFrame] = []
         try:
             path.parent.mkdir(parents=True, exist_ok=True)
             self._file = os.open(path, os.O_RDWR | os.O_CREAT | os.O_APPEND | os.O_CLOEXEC, 0o644)
             with _locked(self._file, fcntl.LOCK_EX):
-                acts = self._begin(self._file)
+                self.opened = self._begin(self._file)
+                """What the journal held when it was opened."""
         except OSError as error:
             self.close()
             raise LabelError(f"{path}: the journal cannot be opened for writing: {error.strerror}") from None
         except LabelError:
             self.close()
             raise
-        self.broken_lines = acts.broken_lines
+        self.broken_lines = self.opened.broken_lines
         """Lines that crashes had broken off when the journal was opened."""
 
     def append(self, *, stamp_ns: int, label: str, labeler: str, source: LabelSource, created_ns: int) -> Label:
@@ -90,6 +92,27 @@ class Journal:
         columns = [pl.lit(self.recording_id), *map(pl.col, ("stamp_ns", "label", "labeler", "source", "created_ns"))]
         rows = acts.select(pl.concat_str([*columns], separator=",").fill_null("") + "\n").to_series().to_list()
         return len(self._append(rows)) if rows else 0
+
+    @property
+    def last_act(self) -> int:
+        """The number of the last act that is known here."""
+        return self._last_act
+
+    def news(self) -> pl.DataFrame:
+        """The acts that others have appended since the journal was opened, or since the last call; columns of COLUMNS.
+
+        Raises LabelError where what they appended is wrong.
+        """
+        if self._file is None:
+            raise LabelError(f"{self.path}: the journal is closed; open it again to read")
+        try:
+            if os.fstat(self._file).st_size != self._known_bytes or not self._is_in_place(self._file):
+                with _locked(self._file, fcntl.LOCK_SH):
+                    self._catch_up(self._file)
+        except OSError as error:
+            raise LabelError(f"{self.path}: the journal cannot be read: {error.strerror}") from None
+        news, self._news = self._news, []
+        return pl.concat([pl.DataFrame(schema=COLUMNS), *news])
 
     def read(self) -> Acts:
         """Everything in the journal now, acts that others appended included."""
@@ -147,6 +170,7 @@ class Journal:
         whole = news[: news.rfind(b"\n") + 1]
         if whole:
             acts = parse_acts(whole, self.path, self.recording_id, self._known_lines + 1, self._last_act).table
+            self._news.append(acts)
             self._advance(whole, int(acts["act_id"][-1]) if len(acts) else self._last_act)
         return news[len(whole) :]
 
@@ -159,6 +183,13 @@ class Journal:
 
     def _check(self, lines: bytes, rows: int, first_line: int) -> None:
         """What is written must read back as the same number of acts."""
+        if rows == 1:  # a person's usual act: the table's rules, without a table
+            text = lines.decode().removesuffix("\n")
+            fault = fault_in(text, journal_kind(self.path), self.recording_id, self._last_act)
+            if fault is not None:
+                raise LabelError(f"{self.path}:{first_line}: {fault}")
+            if text.isprintable() and not text.endswith(BROKEN.decode()):
+                return
         acts = parse_acts(lines, self.path, self.recording_id, first_line, self._last_act)
         if len(acts.table) != rows:
             raise LabelError(f"{self.path}: a labeler's name may not hold line ends; nothing was written")

@@ -1,12 +1,16 @@
 """From many acts to one label a stamp."""
 
 from pathlib import Path
+from typing import Final
 
 import polars as pl
 
 from sdt_tools.labeling.acts import Acts
 from sdt_tools.labeling.journal import read_journal
-from sdt_tools.labeling.vocabulary import LabelKind, LabelSource, journal_path
+from sdt_tools.labeling.vocabulary import SETTLED_BY, LabelKind, LabelSource, journal_path
+
+IS_SETTLEMENT: Final = (pl.col("source") == str(LabelSource.HUMAN)) & pl.col("labeler").str.starts_with(SETTLED_BY)
+"""Whether an act settles what people disagree about."""
 
 _RANK = {str(source): rank for rank, source in enumerate(LabelSource)}
 
@@ -20,11 +24,12 @@ def standing(acts: Acts) -> pl.DataFrame:
 def resolve(acts: Acts) -> pl.DataFrame:
     """One label a stamp: columns stamp_ns (Int64, ascending), label, source, labeler (String).
 
-    The most trusted source that has spoken decides: human, import, truth, command, model; within it the latest act.
-    Stamps where humans disagree are left out, whatever other sources say, until they agree or withdraw; see
-    ``disagreements``.
+    The most trusted source that has spoken decides: a settlement, human, import, truth, command, model; within it the
+    latest act. Stamps where humans disagree are left out, whatever other sources say, until they agree, withdraw or
+    someone settles them; see ``disagreements``.
     """
-    ranked = standing(acts).with_columns(pl.col("source").replace_strict(_RANK, return_dtype=pl.Int8).alias("rank"))
+    rank = pl.col("source").replace_strict(_RANK, return_dtype=pl.Int8)
+    ranked = standing(acts).with_columns(pl.when(IS_SETTLEMENT).then(-1).otherwise(rank).alias("rank"))
     deciding = ranked.filter(pl.col("rank") == pl.col("rank").min().over("stamp_ns"))
     settled = deciding.join(disagreements(acts), on="stamp_ns", how="anti")
     return (
@@ -36,9 +41,14 @@ def resolve(acts: Acts) -> pl.DataFrame:
 
 
 def disagreements(acts: Acts) -> pl.DataFrame:
-    """What stands of the humans who disagree: columns stamp_ns, labeler, label, in order of stamp and labeler."""
-    human = standing(acts).filter(pl.col("source") == str(LabelSource.HUMAN))
-    disputed = human.filter(pl.col("label").n_unique().over("stamp_ns") > 1)
+    """What stands of the humans who disagree: columns stamp_ns, labeler, label, in order of stamp and labeler.
+
+    Without the stamps that someone has settled.
+    """
+    stands = standing(acts)
+    human = stands.filter((pl.col("source") == str(LabelSource.HUMAN)) & ~IS_SETTLEMENT)
+    unsettled = human.join(stands.filter(IS_SETTLEMENT), on="stamp_ns", how="anti")
+    disputed = unsettled.filter(pl.col("label").n_unique().over("stamp_ns") > 1)
     return disputed.sort("stamp_ns", "labeler").select("stamp_ns", "labeler", "label")
 
 

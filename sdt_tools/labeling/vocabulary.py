@@ -2,6 +2,7 @@
 
 from enum import StrEnum
 from pathlib import Path
+from typing import Final
 
 from sdt_tools.errors import LabelError
 from sdt_tools.frames import Gesture, MotionClass
@@ -29,10 +30,21 @@ class LabelSource(StrEnum):
     MODEL = "model"
 
 
+SETTLED_BY: Final = "settled:"
+"""Begins the labeler of an act that settles what people disagree about; the name of the one who settled it follows."""
+
 _CLASSES: dict[LabelKind, tuple[str, ...]] = {
     LabelKind.MOTION: tuple(motion.label for motion in MotionClass),
     LabelKind.GESTURE: tuple(gesture.label for gesture in Gesture),
 }
+
+
+def check_labeler(name: str) -> None:
+    """Raises LabelError for a name that a journal cannot hold."""
+    if not name.strip() or set(name) & set(',"\r\n#') or name.startswith(SETTLED_BY):
+        raise LabelError(
+            f"'{name}': cannot be a labeler's name; use one without commas, quotes, '#' and '{SETTLED_BY}'"
+        )
 
 
 def journal_path(labels_dir: Path, stem: str, kind: LabelKind) -> Path:

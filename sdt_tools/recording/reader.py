@@ -13,6 +13,7 @@ from sdt_tools.errors import RecordingError
 from sdt_tools.frames import Message, Received
 from sdt_tools.recording.container.extents import Extent
 from sdt_tools.recording.container.reader import Damage, McapReader, RawEntry
+from sdt_tools.recording.frames import Frames
 from sdt_tools.recording.messages.codec import decode
 from sdt_tools.recording.messages.topics import LIDAR_SCAN, TOPIC_BY_NAME, TOPICS, Topic, is_ours
 from sdt_tools.recording.series import ScanSeries, joined
@@ -152,6 +153,11 @@ class Recording:
     def stamps(self) -> StampLog:
         """When all messages of our topics were taken and received: streams through the file and decodes nothing."""
         return read_stamps(self._file, {number: channel.topic for number, channel in self._ours.items()})
+
+    def frames(self, topic: str) -> Frames:
+        """The messages of ``topic``, each to be read by itself, whatever their number and the size of the file."""
+        schema = self.schemas.get(topic, "")
+        return Frames(self._file, topic, schema, self._numbers((topic,)))
 
     @property
     def foreign_counts(self) -> Mapping[str, int]:

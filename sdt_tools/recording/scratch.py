@@ -80,12 +80,24 @@ def _locked_folder(out: Path) -> tuple[Path, int]:
     """A new folder, and the lock on it that says that its process lives."""
     while True:
         folder = Path(tempfile.mkdtemp(prefix=f".{out.name}.", suffix=_ENDING, dir=out.parent))
-        lock = os.open(folder, os.O_RDONLY)
-        with suppress(OSError):  # a disk without locks: what is left on it stays
-            fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        if folder.exists():
+        try:
+            lock = os.open(folder, os.O_RDONLY)
+        except FileNotFoundError:
+            continue  # swept away before it was locked
+        if _lock(lock) and folder.exists():
             return folder, lock
-        os.close(lock)  # swept away before it was locked
+        os.close(lock)  # being swept away
+
+
+def _lock(folder: int) -> bool:
+    """Lock an open folder; False where another process holds it."""
+    try:
+        fcntl.flock(folder, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except BlockingIOError:
+        return False
+    except OSError:
+        return True  # a disk without locks: what killed processes leave on it stays
+    return True
 
 
 def _sweep(out: Path) -> None:

@@ -1,7 +1,10 @@
 """Units mapped over processes of this machine: one thread each, one process a core."""
 
 import multiprocessing
+import multiprocessing.connection
+import os
 import signal
+import threading
 from collections.abc import Callable, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from pathlib import Path
@@ -57,9 +60,17 @@ def _run_in_processes(units: Sequence[Unit], root: Path, workers: int, report: C
 
 
 def _begin_worker() -> None:
-    """One thread; Ctrl-C is the parent's to hear, who then ends its workers."""
+    """One thread of work; Ctrl-C is the parent's to hear, who then ends its workers. However he dies, they follow."""
     use_one_thread()
     signal.signal(signal.SIGINT, signal.SIG_IGN)
+    threading.Thread(target=_end_with_parent, daemon=True).start()
+
+
+def _end_with_parent() -> None:
+    parent = multiprocessing.parent_process()
+    assert parent is not None, "only workers wait for a parent"
+    multiprocessing.connection.wait([parent.sentinel])
+    os._exit(1)
 
 
 def _silent(_done: int, _total: int) -> None:

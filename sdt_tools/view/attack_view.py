@@ -11,8 +11,8 @@ from jaxtyping import Float, Float64
 
 from sdt_tools.config import MotionConfig
 from sdt_tools.frames import MotionClass
+from sdt_tools.top_view import Mount, distances, hits_lidar, to_screen
 from sdt_tools.view import entities, palette
-from sdt_tools.view.geometry import Mount, distances, hits_lidar, to_screen
 from sdt_tools.view.rrd_file import RrdFile
 from sdt_tools.view.scan_view import BOLD, POINT, draw_furniture, motion_strips
 

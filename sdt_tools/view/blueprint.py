@@ -7,7 +7,7 @@ import rerun.blueprint as rrb
 
 from sdt_tools.view import entities, palette
 from sdt_tools.view.map_view import Bounds
-from sdt_tools.view.timeline import FRAME, TIME
+from sdt_tools.view.timeline import ERROR, FRAME, TIME
 
 LEGEND_LINES: Final = 10
 """A shorter legend leaves room below it."""
@@ -15,7 +15,11 @@ LEGEND_LINES: Final = 10
 
 @dataclass(frozen=True)
 class Content:
-    """What there is to show. ``reach_m``: how far the scan is shown at first; ``map_bounds``: None without odometry."""
+    """What there is to show.
+
+    ``reach_m``: how far the scan is shown at first; ``map_bounds``: None without odometry; ``errors``: whether there
+    are some to step through, and ``stepping``: whether the view begins at the first of them.
+    """
 
     reach_m: float
     legend_lines: int = 3
@@ -23,6 +27,8 @@ class Content:
     lanes: bool = False
     losses: bool = False
     log: bool = False
+    errors: bool = False
+    stepping: bool = False
     map_bounds: Bounds | None = None
 
 
@@ -39,19 +45,43 @@ def blueprint(content: Content) -> rrb.Blueprint:
     ]
     curves = rrb.Vertical(*([_losses()] if content.losses else []), *_sensor(apart=not content.losses))
     below: list[tuple[rrb.View | rrb.Container, float]] = [(curves, 3.0)]
-    below = [*([(_lanes(), 3.0)] if content.lanes else []), *below, *([(_log(), 2.0)] if content.log else [])]
+    below = [*([(_lanes(), 3.0)] if content.lanes else []), *below, *_words(content)]
     return rrb.Blueprint(
         rrb.Vertical(
             rrb.Horizontal(*above, column_shares=[6.0, 1.0, 3.5][: len(above)]),
             rrb.Horizontal(*(view for view, _ in below), column_shares=[share for _, share in below]),
             row_shares=[3, 2] if content.lanes else [2, 1],
         ),
-        rrb.TimePanel(timeline=TIME, state="collapsed"),
+        _time_panel(content),
         rrb.SelectionPanel(state="hidden"),
         rrb.BlueprintPanel(state="hidden"),
         auto_views=False,
         auto_layout=False,
     )
+
+
+def _time_panel(content: Content) -> rrb.TimePanel:
+    """Where one steps from error to error, it begins at the first and waits."""
+    if content.errors and content.stepping:
+        return rrb.TimePanel(timeline=ERROR, state="collapsed", play_state="paused", fps=1.0)
+    return rrb.TimePanel(timeline=TIME, state="collapsed")
+
+
+def _words(content: Content) -> list[tuple[rrb.View | rrb.Container, float]]:
+    """The error of the moment above the list of all, the log behind the list; without errors, the log."""
+    if not content.errors:
+        return [(_log(), 2.0)] if content.log else []
+    lists = rrb.Tabs(_errors(), *([_log()] if content.log else []))
+    return [(rrb.Vertical(_this_error(), lists, row_shares=[2, 3]), 2.5)]
+
+
+def _errors() -> rrb.TextLogView:
+    columns = rrb.TextLogColumns(timeline_columns=[ERROR], text_log_columns=["Body"])
+    return rrb.TextLogView(origin=entities.ERROR_LIST, name="Errors (a number leads to it)", columns=columns)
+
+
+def _this_error() -> rrb.TextDocumentView:
+    return rrb.TextDocumentView(origin=entities.ERROR_WORDS, name="This error")
 
 
 def _scan(reach_m: float) -> rrb.Spatial2DView:

@@ -7,7 +7,7 @@ import rerun as rr
 
 from sdt_tools.frames import CameraImage, Gesture, OperatorState
 from sdt_tools.view import entities, palette
-from sdt_tools.view.timeline import When, send
+from sdt_tools.view.timeline import Rows, send
 
 _COLORS: Final = {
     Gesture.IDLE: palette.ROBOT,
@@ -16,7 +16,7 @@ _COLORS: Final = {
 }
 
 
-def send_images(stream: rr.RecordingStream, rows: When, images: Sequence[CameraImage]) -> None:
+def send_images(stream: rr.RecordingStream, rows: Rows, images: Sequence[CameraImage]) -> None:
     """Compressed pictures, as they were recorded."""
     columns = rr.EncodedImage.columns(
         blob=[image.data for image in images], media_type=[f"image/{image.format}" for image in images]
@@ -24,7 +24,7 @@ def send_images(stream: rr.RecordingStream, rows: When, images: Sequence[CameraI
     send(stream, entities.CAMERA_IMAGE, rows, columns)
 
 
-def send_signals(stream: rr.RecordingStream, rows: When, signals: Sequence[OperatorState]) -> None:
+def send_signals(stream: rr.RecordingStream, rows: Rows, signals: Sequence[OperatorState]) -> None:
     """The operator's true gesture, and the mode that he has asked for, as a line in the picture."""
     words = [f"gesture: {signal.gesture.label}   asked for: {signal.commanded_mode.label}" for signal in signals]
     colors = palette.packed(_COLORS[signal.gesture] for signal in signals)

@@ -14,6 +14,16 @@ from sdt_tools.view.timeline import held
 KEY = ("recording_id", "model", "stamp_ns")
 """What a row of predictions and a row of tags share."""
 
+_ANSWERS = {
+    "recording_id": pl.String(),
+    "model": pl.String(),
+    "stamp_ns": pl.Int64(),
+    "label": pl.String(),
+    "predicted": pl.String(),
+    "loss_ce": pl.Float32(),
+}
+_NO_ANSWERS = pl.DataFrame(schema=_ANSWERS)
+
 
 @dataclass(frozen=True, eq=False)
 class Labels:
@@ -59,22 +69,32 @@ def labels_of(frame: pl.DataFrame | None) -> Labels:
     return Labels(known["stamp_ns"].to_numpy(), tuple(known["label"].to_list()))
 
 
+def labels_in(models: Sequence[ModelTrack]) -> Labels:
+    """Labels as the first model's frames carry them that has any."""
+    for track in models:
+        rows = [row for row, label in enumerate(track.labels) if label]
+        if rows:
+            return Labels(track.stamps_ns[np.array(rows)], tuple(track.labels[row] for row in rows))
+    return labels_of(None)
+
+
 def models_of(
     recording_id: str, predictions: Sequence[pl.DataFrame], tags: Sequence[pl.DataFrame], labels: Labels
 ) -> tuple[ModelTrack, ...]:
     """The tracks of all models over the recording ``recording_id``, in the order in which they are first given.
 
     Frames of predictions hold the columns recording_id, stamp_ns, model, label, predicted and loss_ce; those of tags
-    the same key and tag. Rows of other recordings are passed over. Where predictions were made without labels,
-    ``labels`` take their place; the loss stays unknown.
+    the same key and tag, and the others too where a model is known from them alone. Rows of other recordings are passed
+    over. Where predictions were made without labels, ``labels`` take their place; the loss stays unknown.
 
     Raises UsageError where all predictions are about other recordings, and for an unknown tag.
     """
-    ours = [frame.filter(pl.col("recording_id") == recording_id) for frame in predictions]
-    columns = [*KEY, "label", "predicted", "loss_ce"]
-    rows = pl.concat([frame.select(columns) for frame in ours]) if ours else pl.DataFrame(schema=columns)
+    ours = [_answers(frame, recording_id) for frame in predictions]
+    rows = pl.concat(ours or [_NO_ANSWERS])
     if predictions and rows.is_empty():
         raise UsageError(_nothing_about(recording_id, predictions))
+    told = [_answers(frame, recording_id) for frame in tags if set(_ANSWERS) <= set(frame.columns)]
+    rows = pl.concat([rows, pl.concat(told or [_NO_ANSWERS]).join(rows, on="model", how="anti")])
     if rows.is_empty():
         return ()
     rows = rows.unique(KEY, keep="last", maintain_order=True)
@@ -85,6 +105,12 @@ def models_of(
     rows = rows.join(known, on="stamp_ns", how="left", maintain_order="left")
     rows = rows.with_columns(pl.coalesce("label", "given").fill_null("").alias("label"), pl.col("tag").fill_null(""))
     return tuple(_track(frame) for frame in rows.partition_by("model", maintain_order=True))
+
+
+def _answers(frame: pl.DataFrame, recording_id: str) -> pl.DataFrame:
+    """What models said about one recording."""
+    ours = frame.filter(pl.col("recording_id") == recording_id)
+    return ours.select(pl.col(name).cast(dtype) for name, dtype in _ANSWERS.items())
 
 
 def _nothing_about(recording_id: str, predictions: Sequence[pl.DataFrame]) -> str:

@@ -34,6 +34,9 @@ CODE_SHARE: Final = "sensor/codes_percent"
 SPEED: Final = "sensor/speed_mps"
 LOG: Final = "log"
 SESSION_LOG: Final = "log/session"
+ERRORS: Final = "errors"
+ERROR_LIST: Final = "errors/list"
+ERROR_WORDS: Final = "errors/words"
 LEGEND: Final = "legend"
 
 

@@ -1,7 +1,8 @@
 """What lies on disk about a recording, read for the view: journals, prediction files, tag files."""
 
-from collections.abc import Sequence
+from collections.abc import Collection, Mapping, Sequence
 from pathlib import Path
+from typing import Any
 
 import polars as pl
 
@@ -12,6 +13,7 @@ from sdt_tools.view.decisions import KEY
 from sdt_tools.view.log import ViewSummary, write_rrd
 
 ANALYSIS_TAGS = "tags.parquet"
+_MORE = ("recording", "label", "predicted", "loss_ce", "neighbours", "right_neighbours")
 
 
 def write_rrd_from_files(
@@ -20,12 +22,14 @@ def write_rrd_from_files(
     *,
     labels_dir: Path | None = None,
     predictions: Sequence[Path] = (),
-    tags: Sequence[Path] = (),
+    errors: Sequence[Path] = (),
+    step_tags: Collection[str] = (),
     every: int = 1,
 ) -> ViewSummary:
     """Write ``recording`` with its motion labels in ``labels_dir``, and what files say of it, to ``out``.
 
-    A folder among ``tags`` stands for the tags in it, as an error analysis leaves them. Raises LabelError where
+    ``errors`` are folders of error analyses, or the tags files in them; errors with one of the tags ``step_tags`` (all
+    without) can be stepped through. Raises LabelError where
     ``labels_dir`` has no journal of the recording, UsageError for a file that does not hold what it should, and what
     ``write_rrd`` raises.
     """
@@ -34,7 +38,8 @@ def write_rrd_from_files(
         out,
         labels=None if labels_dir is None else read_labels(labels_dir, recording.stem, LabelKind.MOTION),
         predictions=[read_predictions(path) for path in predictions],
-        tags=[read_tags(path) for path in tags],
+        tags=[read_tags(path) for path in errors],
+        step_tags=step_tags,
         every=every,
     )
 
@@ -47,11 +52,17 @@ def read_predictions(path: Path) -> pl.DataFrame:
 
 
 def read_tags(path: Path) -> pl.DataFrame:
-    """The tags in ``path``, or in the analysis that it is the folder of. Raises UsageError where it holds none."""
+    """The tags in ``path``, or in the analysis that it is the folder of. Raises UsageError where it holds none.
+
+    Beside what is needed come, as far as they are there, answers, neighbours and the ``condition`` in words.
+    """
+    from sdt_tools.error_analysis.report.tags_file import read_made_from
+
     file = path / ANALYSIS_TAGS if path.is_dir() else path
     columns = [*KEY, "tag"]
     try:
-        missing = set(columns) - set(pl.read_parquet_schema(file))
+        names = list(pl.read_parquet_schema(file))
+        missing = set(columns) - set(names)
     except FileNotFoundError:
         raise UsageError(f"{file}: no such file; name the tags that `sdt errors` made") from None
     except (pl.exceptions.PolarsError, OSError) as error:
@@ -60,4 +71,14 @@ def read_tags(path: Path) -> pl.DataFrame:
         ) from None
     if missing:
         raise UsageError(f"{file}: not a tags file: it lacks the column '{min(missing)}'; make one with `sdt errors`")
-    return pl.read_parquet(file, columns=columns)
+    known = [name for name in names if name in {*columns, *_MORE}]
+    table = pl.scan_parquet(file)
+    return table.select(*known, _conditions(names, read_made_from(file)).alias("condition")).collect()
+
+
+def _conditions(names: Sequence[str], made_from: Mapping[str, Any]) -> pl.Expr:
+    """The texts of the conditions that a frame lies in."""
+    texts = [str(condition["text"]) for condition in made_from.get("conditions", [])]
+    inside = [(f"condition_{number}", text) for number, text in enumerate(texts, start=1)]
+    parts = [pl.when(pl.col(name)).then(pl.lit(text)) for name, text in inside if name in names]
+    return pl.concat_str(parts, separator="; ", ignore_nulls=True) if parts else pl.lit("")

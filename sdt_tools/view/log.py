@@ -1,7 +1,7 @@
 """A whole recording as one .rrd: scans, camera, truth, labels, predictions and tags on one timeline."""
 
 import time
-from collections.abc import Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
@@ -19,12 +19,14 @@ from sdt_tools.recording.reader import Recording
 from sdt_tools.view.blueprint import Content, blueprint
 from sdt_tools.view.camera_view import send_images
 from sdt_tools.view.decisions import NOTHING_JUDGED, judge
+from sdt_tools.view.error_steps import ErrorStep, numbered, scans_at, stamps_of
 from sdt_tools.view.map_view import draw_surroundings, map_bounds
 from sdt_tools.view.rrd_file import RrdFile
 from sdt_tools.view.scan_view import send_scans, style_scans
+from sdt_tools.view.step_views import draw_at_steps
 from sdt_tools.view.story import Story, draw_story, gather_story, has_log, has_losses, legend
 from sdt_tools.view.survey import survey
-from sdt_tools.view.timeline import when
+from sdt_tools.view.timeline import held, when
 
 SCANS_AT_ONCE: Final = 512
 IMAGES_AT_ONCE: Final = 64
@@ -33,7 +35,11 @@ SCANS_ON_MAP: Final = 150
 
 @dataclass(frozen=True)
 class ViewSummary:
-    """What went into an .rrd. ``lanes`` are entities; an ``incomplete`` recording is shown as far as it goes."""
+    """What went into an .rrd. ``lanes`` are entities; an ``incomplete`` recording is shown as far as it goes.
+
+    ``errors`` are those to step through, in the order of their numbers; ``errors_elsewhere`` counts the like in other
+    recordings.
+    """
 
     out: Path
     recording_id: str
@@ -42,6 +48,8 @@ class ViewSummary:
     images: int
     models: tuple[str, ...]
     lanes: tuple[str, ...]
+    errors: tuple[ErrorStep, ...]
+    errors_elsewhere: Mapping[str, int]
     incomplete: Incomplete | None
     seconds: float
 
@@ -58,6 +66,7 @@ def write_rrd(
     labels: pl.DataFrame | None = None,
     predictions: Sequence[pl.DataFrame] = (),
     tags: Sequence[pl.DataFrame] = (),
+    step_tags: Collection[str] = (),
     every: int = 1,
     motions: MotionConfig | None = None,
 ) -> ViewSummary:
@@ -65,7 +74,9 @@ def write_rrd(
 
     ``labels`` are resolved (stamp_ns, label); ``predictions`` and ``tags`` have the columns of prediction files and of
     tag files, of any number of models and recordings: rows of other recordings are passed over. The first model colours
-    the scans. ``every`` shows one scan in so many; ``motions`` shapes the arrows.
+    the scans. Errors with one of the tags ``step_tags`` can be stepped through, and the view begins at the first;
+    without, all errors can, and it begins with the recording. ``every`` shows one scan in so many; ``motions`` shapes
+    the arrows.
 
     Raises OutputExistsError; UsageError for ``every`` below 1 and for predictions of which none is about ``recording``;
     RecordingError where there is nothing to read; RunError where the disk does not take it all.
@@ -77,7 +88,7 @@ def write_rrd(
         raise OutputExistsError(out)
     with Recording.open(recording) as source:
         scans = survey(source.scan_batches(SCANS_AT_ONCE))
-        story = gather_story(source, scans, labels, predictions, tags, motions or MotionConfig())
+        story = gather_story(source, scans, labels, predictions, tags, step_tags, motions or MotionConfig())
         out.parent.mkdir(parents=True, exist_ok=True)
         partial = out.with_name(f".{out.name}.partial")
         try:
@@ -93,6 +104,8 @@ def write_rrd(
             images=images,
             models=tuple(track.model for track in story.models),
             lanes=tuple(lane.entity for lane in story.lanes),
+            errors=story.steps,
+            errors_elsewhere=story.elsewhere,
             incomplete=incomplete(source),
             seconds=time.perf_counter() - began,
         )
@@ -107,6 +120,8 @@ def _write(path: Path, name: str, source: Recording, story: Story, every: int) -
     with RrdFile(path, f"sdt {name}", f"{source.recording_id}/{name}", layout) as file:
         file.stream.send_recording_name(source.stem)
         draw_story(file.stream, story)
+        if story.steps:
+            draw_at_steps(file.stream, story)
         return _draw_scans(file.stream, source, story, every), _draw_images(file.stream, source, story)
 
 
@@ -119,13 +134,16 @@ def _content(source: Recording, story: Story) -> Content:
         lanes=bool(story.lanes),
         losses=has_losses(story),
         log=has_log(story),
+        errors=bool(story.steps),
+        stepping=story.stepping,
         map_bounds=map_bounds([robot, operator]) if len(robot.stamps_ns) else None,
     )
 
 
 def _draw_scans(stream: rr.RecordingStream, source: Recording, story: Story, every: int) -> int:
-    """One scan in ``every``; a few, spread over the recording, go into the map."""
+    """One scan in ``every``, and those of errors; a few, spread over the recording, go into the map."""
     scan_ns, reach_m = story.scans.stamps_ns, story.scans.reach_m
+    steps_ns, steps = stamps_of(story.steps), numbered(story.steps)
     judged = judge(story.models[0]) if story.models else NOTHING_JUDGED
     on_map = np.unique(np.linspace(0, max(0, len(scan_ns) - 1), SCANS_ON_MAP).astype(np.int64))
     kept_ns, kept_m = [np.empty(0, np.int64)], [np.empty((0, RAYS))]
@@ -136,6 +154,8 @@ def _draw_scans(stream: rr.RecordingStream, source: Recording, story: Story, eve
         chosen, kept = numbers % every == 0, np.isin(numbers, on_map)
         rows = when(batch.stamps_ns[chosen], scan_ns)
         send_scans(stream, rows, batch.ranges_m[chosen], judged.at(rows.stamps_ns), reach_m)
+        found, ranges_m = scans_at(batch.stamps_ns, batch.ranges_m, steps_ns)
+        send_scans(stream, steps.at(found), ranges_m, [story.steps[step].tag for step in found.tolist()], reach_m)
         kept_ns.append(batch.stamps_ns[kept])
         kept_m.append(batch.ranges_m[kept])
         seen, shown = seen + len(batch), shown + len(rows)
@@ -160,5 +180,9 @@ def _draw_images(stream: rr.RecordingStream, source: Recording, story: Story) ->
 
 
 def _send_waiting(stream: rr.RecordingStream, images: list[CameraImage], story: Story) -> None:
+    """Some images; those taken in the last moment before an error are shown with it too."""
     stamps_ns = np.array([image.stamp_ns for image in images], np.int64)
     send_images(stream, when(stamps_ns, story.scans.stamps_ns), images)
+    seen = held(stamps_ns, stamps_of(story.steps))
+    known = np.flatnonzero(seen >= 0)
+    send_images(stream, numbered(story.steps).at(known), [images[number] for number in seen[known].tolist()])

@@ -9,11 +9,11 @@ import rerun as rr
 from jaxtyping import Float64, Int64
 
 from sdt_tools.replay.tracks import PoseTrack
+from sdt_tools.top_view import Mount, distances, footprint_base, hits_lidar, lidar_poses, place, to_screen
 from sdt_tools.view import entities, palette
-from sdt_tools.view.geometry import Mount, distances, footprint_base, hits_lidar, lidar_poses, place, to_screen
 from sdt_tools.view.palette import Rgb
 from sdt_tools.view.scan_view import NORMAL, THIN
-from sdt_tools.view.timeline import When, send
+from sdt_tools.view.timeline import Rows, send
 
 MARGIN_M: Final = 2.0
 FARTHEST_HIT_M: Final = 8.0
@@ -69,7 +69,7 @@ def style_robot(stream: rr.RecordingStream) -> None:
     stream.log(entities.MAP_ROBOT, style, static=True, strict=True)
 
 
-def send_robot(stream: rr.RecordingStream, rows: When, bases: Float64[np.ndarray, "rows 3"]) -> None:
+def send_robot(stream: rr.RecordingStream, rows: Rows, bases: Float64[np.ndarray, "rows 3"]) -> None:
     """The robot's footprint where its base stood (x m, y m, yaw rad)."""
     outlines, chevrons = (to_screen(place(strip, bases)) for strip in footprint_base())
     strips = [strip for pair in zip(outlines, chevrons, strict=True) for strip in pair]

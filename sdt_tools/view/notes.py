@@ -16,7 +16,7 @@ from sdt_tools.frames import (
     Received,
 )
 from sdt_tools.recording.messages.topics import CAMERA_CALIBRATION, OPERATOR_STATE, SESSION_LOG, TRANSFORM
-from sdt_tools.view.geometry import Mount
+from sdt_tools.top_view import Mount
 
 NOTE_TOPICS: Final = (OPERATOR_STATE, SESSION_LOG, TRANSFORM, CAMERA_CALIBRATION)
 USUAL_MOUNT: Final = Mount()

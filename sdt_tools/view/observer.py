@@ -24,10 +24,10 @@ from sdt_tools.frames import (
     Pose2D,
     Received,
 )
+from sdt_tools.top_view import codes, front_range_m, lidar_poses, seen_from
 from sdt_tools.view import entities, palette
 from sdt_tools.view.blueprint import Content, blueprint
 from sdt_tools.view.camera_view import send_images, send_signals, style_signals
-from sdt_tools.view.geometry import codes, front_range_m, lidar_poses, seen_from
 from sdt_tools.view.lanes import style_lane
 from sdt_tools.view.notes import USUAL_MOUNT, USUAL_WIDTH_PX, is_lidar_mount, mount_of
 from sdt_tools.view.people import send_operator, style_operator
@@ -51,8 +51,11 @@ COMMAND: Final = "command"
 class RerunObserver:
     """An Observer that streams what it sees to Rerun: ``in_window``, ``to_viewer`` or ``to_file``."""
 
-    def __init__(self, stream: rr.RecordingStream, motions: MotionConfig | None = None) -> None:
+    def __init__(
+        self, stream: rr.RecordingStream, motions: MotionConfig | None = None, period_ns: int = LIVE_PERIOD_NS
+    ) -> None:
         self._stream = stream
+        self._period_ns = period_ns
         self._file: RrdFile | None = None
         self._motions = motions or MotionConfig()
         self._mount = USUAL_MOUNT
@@ -69,11 +72,16 @@ class RerunObserver:
         return cls.to_viewer(viewer_url(open_window()), motions)
 
     @classmethod
-    def to_viewer(cls, url: str, motions: MotionConfig | None = None) -> "RerunObserver":
-        """A viewer that runs already, as at ``rerun+http://127.0.0.1:9876/proxy``."""
+    def to_viewer(
+        cls, url: str, motions: MotionConfig | None = None, period_ns: int = LIVE_PERIOD_NS
+    ) -> "RerunObserver":
+        """A viewer that runs already, as at ``rerun+http://127.0.0.1:9876/proxy``.
+
+        Scans and poses are drawn so far apart at least; a ``period_ns`` of 0 draws all.
+        """
         stream = rr.RecordingStream(LIVE, recording_id=_live_id(), send_properties=False)
         stream.connect_grpc(url, default_blueprint=blueprint(LIVE_CONTENT))
-        return cls(stream, motions)
+        return cls(stream, motions, period_ns)
 
     @classmethod
     def to_file(cls, path: Path, motions: MotionConfig | None = None) -> "RerunObserver":
@@ -109,6 +117,11 @@ class RerunObserver:
             case _:
                 pass
 
+    def flush(self) -> None:
+        """Wait until what was observed has been sent; a viewer that is gone is no error."""
+        with suppress(RuntimeError):
+            self._stream.flush(timeout_sec=CLOSE_S)
+
     def close(self) -> None:
         """Send what is left and let go of the viewer or file; may be called twice.
 
@@ -117,8 +130,7 @@ class RerunObserver:
         if self._file is not None:
             self._file.close()
             return
-        with suppress(RuntimeError):  # someone closed the viewer: a session does not depend on it
-            self._stream.flush(timeout_sec=CLOSE_S)
+        self.flush()  # someone may have closed the viewer: a session does not depend on it
         self._stream.disconnect()
 
     def _prepare(self) -> None:
@@ -173,7 +185,7 @@ class RerunObserver:
 
     def _is_due(self, entity: str, stamp_ns: int) -> bool:
         """Whether ``entity`` was last drawn long enough ago; then it counts as drawn now."""
-        if 0 <= stamp_ns - self._drawn_ns.get(entity, -LIVE_PERIOD_NS) < LIVE_PERIOD_NS:
+        if 0 <= stamp_ns - self._drawn_ns.get(entity, -self._period_ns) < self._period_ns:
             return False
         self._drawn_ns[entity] = stamp_ns
         return True

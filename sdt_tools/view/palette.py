@@ -6,9 +6,11 @@ from typing import Final
 import numpy as np
 from jaxtyping import UInt32
 
-from sdt_tools.frames import Gesture, LogLevel, Mode, MotionClass
+from sdt_tools import class_colors
+from sdt_tools.class_colors import Rgb
+from sdt_tools.frames import LogLevel
 
-Rgb = tuple[int, int, int]
+__all__ = ["Rgb"]
 
 BACKGROUND: Final[Rgb] = (16, 18, 24)
 FAINT: Final[Rgb] = (62, 68, 80)
@@ -47,26 +49,9 @@ MODELS: Final[tuple[Rgb, ...]] = (
 )
 """Models, in the order given; they repeat after the last."""
 
-MOTIONS: Final[dict[str, Rgb]] = {
-    MotionClass.STAY.label: (130, 138, 150),
-    MotionClass.FORWARD.label: (76, 160, 92),
-    MotionClass.LEFT_FORWARD.label: (32, 150, 160),
-    MotionClass.RIGHT_FORWARD.label: (140, 170, 60),
-    MotionClass.BACKWARD.label: (200, 84, 84),
-    MotionClass.LEFT_BACKWARD.label: (150, 96, 190),
-    MotionClass.RIGHT_BACKWARD.label: (214, 136, 60),
-}
-
-GESTURES: Final[dict[str, Rgb]] = {
-    Gesture.IDLE.label: (132, 140, 154),
-    Gesture.ENABLE.label: (76, 160, 92),
-    Gesture.DISABLE.label: (200, 84, 84),
-}
-
-MODES: Final[dict[str, Rgb]] = {
-    Mode.IDLE.label: (132, 140, 154),
-    Mode.ACTIVE.label: (64, 132, 214),
-}
+MOTIONS: Final = class_colors.MOTIONS
+GESTURES: Final = class_colors.GESTURES
+MODES: Final = class_colors.MODES
 
 ANSWERS: Final = MOTIONS | GESTURES
 """All that a model can answer."""

@@ -6,10 +6,10 @@ import numpy as np
 import rerun as rr
 from jaxtyping import Float64
 
+from sdt_tools.top_view import arc, place, to_screen
 from sdt_tools.view import palette
-from sdt_tools.view.geometry import arc, place, to_screen
 from sdt_tools.view.scan_view import NORMAL
-from sdt_tools.view.timeline import When, send
+from sdt_tools.view.timeline import Rows, send
 
 BODY_RADIUS_M: Final = 0.22
 NOSE_M: Final = 0.35
@@ -25,7 +25,7 @@ def style_operator(stream: rr.RecordingStream, entity: str) -> None:
     stream.log(entity, style, static=True, strict=True)
 
 
-def send_operator(stream: rr.RecordingStream, entity: str, rows: When, poses: Float64[np.ndarray, "rows 3"]) -> None:
+def send_operator(stream: rr.RecordingStream, entity: str, rows: Rows, poses: Float64[np.ndarray, "rows 3"]) -> None:
     """The operator at ``poses`` (x m, y m, yaw rad) in the frame that the view shows."""
     bodies, noses = to_screen(place(_BODY, poses)), to_screen(place(_NOSE, poses))
     strips = [strip for pair in zip(bodies, noses, strict=True) for strip in pair]

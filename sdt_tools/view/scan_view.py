@@ -9,8 +9,7 @@ from jaxtyping import Float32, Float64
 
 from sdt_tools.config import MotionConfig
 from sdt_tools.frames import FIRST_RAY_RAD, MotionClass, ray_angles_rad
-from sdt_tools.view import entities, palette
-from sdt_tools.view.geometry import (
+from sdt_tools.top_view import (
     Mount,
     arc,
     base_to_lidar,
@@ -22,8 +21,9 @@ from sdt_tools.view.geometry import (
     safety_zone_lidar,
     to_screen,
 )
+from sdt_tools.view import entities, palette
 from sdt_tools.view.palette import Rgb
-from sdt_tools.view.timeline import When, send
+from sdt_tools.view.timeline import Rows, send
 
 Strip = Float32[np.ndarray, "_ 2"]
 
@@ -79,7 +79,7 @@ def style_scans(stream: rr.RecordingStream) -> None:
 
 def send_scans(
     stream: rr.RecordingStream,
-    rows: When,
+    rows: Rows,
     ranges_m: Float64[np.ndarray, "rows rays"],
     statuses: Sequence[str],
     reach_m: float,
@@ -103,7 +103,7 @@ def style_motion(stream: rr.RecordingStream, entity: str, color: Rgb, radius: fl
 
 
 def send_motions(
-    stream: rr.RecordingStream, entity: str, rows: When, motions: Sequence[str], config: MotionConfig, mount: Mount
+    stream: rr.RecordingStream, entity: str, rows: Rows, motions: Sequence[str], config: MotionConfig, mount: Mount
 ) -> None:
     """Motion classes as the way the robot would go with them; what is none of them is not drawn."""
     shapes = {motion.label: motion_strips(motion, config, mount) for motion in MotionClass}

@@ -9,7 +9,7 @@ from jaxtyping import Float64, Int64
 from sdt_tools.view import entities, palette
 from sdt_tools.view.decisions import ModelTrack
 from sdt_tools.view.palette import Rgb
-from sdt_tools.view.timeline import When, send, when
+from sdt_tools.view.timeline import Rows, send, when
 
 
 def send_losses(
@@ -23,7 +23,7 @@ def send_losses(
         send_scalars(stream, entity, when(track.stamps_ns[known], scan_stamps_ns), track.loss[known])
 
 
-def send_scalars(stream: rr.RecordingStream, entity: str, rows: When, values: Float64[np.ndarray, "rows"]) -> None:
+def send_scalars(stream: rr.RecordingStream, entity: str, rows: Rows, values: Float64[np.ndarray, "rows"]) -> None:
     """One curve; what is not finite is left out."""
     known = np.isfinite(values)
     send(stream, entity, rows.at(known), rr.Scalars.columns(scalars=values[known]))

@@ -1,6 +1,6 @@
 """Everything that is told of a recording besides its scans and images, gathered and drawn."""
 
-from collections.abc import Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Final
 
@@ -13,10 +13,17 @@ from sdt_tools.clock import SECOND_NS
 from sdt_tools.config import MotionConfig
 from sdt_tools.recording.reader import Recording
 from sdt_tools.replay.tracks import Tracks, read_tracks
+from sdt_tools.top_view import lidar_poses, seen_from
 from sdt_tools.view import entities, palette
 from sdt_tools.view.camera_view import send_signals, style_signals
-from sdt_tools.view.decisions import Labels, ModelTrack, error_runs, labels_of, models_of
-from sdt_tools.view.geometry import lidar_poses, seen_from
+from sdt_tools.view.decisions import Labels, ModelTrack, error_runs, labels_in, labels_of, models_of
+from sdt_tools.view.error_steps import (
+    ERROR_TAGS,
+    ErrorStep,
+    check_tags,
+    error_steps,
+    errors_elsewhere,
+)
 from sdt_tools.view.lanes import Lane, lanes_of, send_lanes
 from sdt_tools.view.map_view import draw_way, send_robot, style_robot
 from sdt_tools.view.notes import NOTE_TOPICS, Notes, read_notes
@@ -25,7 +32,7 @@ from sdt_tools.view.people import send_operator, style_operator
 from sdt_tools.view.scan_view import BOLD, draw_furniture, send_motions, style_motion
 from sdt_tools.view.series import send_losses, send_scalars, style_sensor_series
 from sdt_tools.view.survey import Survey
-from sdt_tools.view.timeline import changes, send, when
+from sdt_tools.view.timeline import Rows, changes, send, when
 from sdt_tools.view.words import draw_legend, send_words
 
 TRUTH_NS: Final = SECOND_NS // 25
@@ -34,7 +41,11 @@ TRUTH_NS: Final = SECOND_NS // 25
 
 @dataclass(frozen=True, eq=False)
 class Story:
-    """What is known of a recording, besides scans and images themselves."""
+    """What is known of a recording, besides scans and images themselves.
+
+    ``steps`` are the errors to step through, and ``stepping`` whether that is what was asked for; ``elsewhere`` counts
+    the like in other recordings.
+    """
 
     scans: Survey
     tracks: Tracks
@@ -43,6 +54,9 @@ class Story:
     models: tuple[ModelTrack, ...]
     lanes: tuple[Lane, ...]
     motions: MotionConfig
+    steps: tuple[ErrorStep, ...]
+    stepping: bool
+    elsewhere: Mapping[str, int]
 
 
 def gather_story(
@@ -51,17 +65,33 @@ def gather_story(
     labels: pl.DataFrame | None,
     predictions: Sequence[pl.DataFrame],
     tags: Sequence[pl.DataFrame],
+    step_tags: Collection[str],
     motions: MotionConfig,
 ) -> Story:
     """Gather what ``source`` says, and what ``labels``, ``predictions`` and ``tags`` say of it.
 
-    Raises UsageError where predictions are given and none of them is about ``source``.
+    Errors with one of the tags ``step_tags`` (all without) can be stepped through. Raises UsageError where predictions
+    are given and none of them is about ``source``, and for the name of no tag.
     """
+    check_tags(step_tags)
+    wanted = step_tags or ERROR_TAGS
     tracks, notes = read_tracks(source), read_notes(source.messages(NOTE_TOPICS))
     given = labels_of(labels)
     models = models_of(source.recording_id, predictions, tags, given)
+    given = given if labels is not None else labels_in(models)
     lanes = lanes_of(tracks, notes, given, models)
-    return Story(scans, tracks, notes, given, models, tuple(lanes), motions)
+    return Story(
+        scans=scans,
+        tracks=tracks,
+        notes=notes,
+        labels=given,
+        models=models,
+        lanes=tuple(lanes),
+        motions=motions,
+        steps=error_steps(source.recording_id, tags, wanted),
+        stepping=bool(step_tags),
+        elsewhere=errors_elsewhere(source.recording_id, tags, wanted),
+    )
 
 
 def has_log(story: Story) -> bool:
@@ -135,17 +165,23 @@ def _draw_truth(stream: rr.RecordingStream, story: Story) -> None:
         send_robot(stream, when(robot_ns, scan_ns), robot.at(robot_ns).T)
     if len(operator_ns):
         draw_way(stream, entities.MAP_OPERATOR_WAY, operator, palette.OPERATOR)
-        bases, poses = robot.at(operator_ns).T, operator.at(operator_ns).T
-        known = np.isfinite(bases).all(axis=1)
-        seen = seen_from(lidar_poses(bases[known], story.notes.mount), poses[known])
         style_operator(stream, entities.MAP_OPERATOR)
         style_operator(stream, entities.SCAN_OPERATOR)
-        send_operator(stream, entities.MAP_OPERATOR, when(operator_ns, scan_ns), poses)
-        send_operator(stream, entities.SCAN_OPERATOR, when(operator_ns[known], scan_ns), seen)
+        send_operators(stream, story, when(operator_ns, scan_ns), operator_ns)
     if story.notes.signals:
         signals = story.notes.signals
         style_signals(stream, story.notes.image_width_px)
         send_signals(stream, when(_stamps([signal.stamp_ns for signal in signals]), scan_ns), signals)
+
+
+def send_operators(stream: rr.RecordingStream, story: Story, rows: Rows, stamps_ns: Int64[np.ndarray, "rows"]) -> None:
+    """The operator in the map and in the scan, where he is known at ``stamps_ns``."""
+    bases, poses = story.tracks.robot.at(stamps_ns).T, story.tracks.operator.at(stamps_ns).T
+    there = np.isfinite(poses).all(axis=1)
+    known = there & np.isfinite(bases).all(axis=1)
+    seen = seen_from(lidar_poses(bases[known], story.notes.mount), poses[known])
+    send_operator(stream, entities.MAP_OPERATOR, rows.at(there), poses[there])
+    send_operator(stream, entities.SCAN_OPERATOR, rows.at(known), seen)
 
 
 def _thinned(stamps_ns: Int64[np.ndarray, "all"]) -> Int64[np.ndarray, "some"]:

@@ -8,7 +8,7 @@ import numpy as np
 from jaxtyping import Float64, Int64
 
 from sdt_tools.recording.series import ScanSeries
-from sdt_tools.view.geometry import codes, distances, front_range_m
+from sdt_tools.top_view import codes, distances, front_range_m
 
 SMALLEST_REACH_M: Final = 2.5
 LARGEST_REACH_M: Final = 5.0

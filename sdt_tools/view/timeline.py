@@ -1,12 +1,13 @@
-"""The two timelines that everything is logged on, and what stays true between two stamps.
+"""The timelines that things are logged on, and what stays true between two stamps.
 
 ``time`` is the moment of a measurement in UTC; ``frame`` counts the recording's scans, and a message between two scans
-belongs to the earlier one.
+belongs to the earlier one. Where there are errors to step through, what was known at each is logged once more on a
+timeline of its own, ``error``, which counts them.
 """
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from typing import Final
+from typing import Final, Protocol, runtime_checkable
 
 import numpy as np
 import rerun as rr
@@ -14,14 +15,30 @@ from jaxtyping import Bool, Int64
 
 TIME: Final = "time"
 FRAME: Final = "frame"
+ERROR: Final = "error"
 
 LONGEST_HOLD_NS: Final = 500_000_000
 """A sampled state is never taken to last longer than this after its last sample."""
 
 
+@runtime_checkable
+class Rows(Protocol):
+    """Where on the timelines rows lie."""
+
+    def __len__(self) -> int: ...
+
+    def at(self, rows: Int64[np.ndarray, "chosen"] | Bool[np.ndarray, "rows"] | slice) -> "Rows":
+        """Some of the rows."""
+        ...
+
+    def columns(self) -> list[rr.TimeColumn]:
+        """As Rerun takes them."""
+        ...
+
+
 @dataclass(frozen=True, eq=False)
 class When:
-    """Rows on both timelines."""
+    """Rows on the timelines ``time`` and ``frame``."""
 
     stamps_ns: Int64[np.ndarray, "rows"]
     frames: Int64[np.ndarray, "rows"]
@@ -41,13 +58,50 @@ class When:
         ]
 
 
+@dataclass(frozen=True, eq=False)
+class Steps:
+    """Rows on the timeline ``error``."""
+
+    numbers: Int64[np.ndarray, "rows"]
+
+    def __len__(self) -> int:
+        return len(self.numbers)
+
+    def at(self, rows: Int64[np.ndarray, "chosen"] | Bool[np.ndarray, "rows"] | slice) -> "Steps":
+        """Some of the rows."""
+        return Steps(self.numbers[rows])
+
+    def columns(self) -> list[rr.TimeColumn]:
+        """As Rerun takes them."""
+        return [rr.TimeColumn(ERROR, sequence=self.numbers)]
+
+
+@dataclass(frozen=True, eq=False)
+class Both:
+    """Rows on all three timelines."""
+
+    when: When
+    steps: Steps
+
+    def __len__(self) -> int:
+        return len(self.steps)
+
+    def at(self, rows: Int64[np.ndarray, "chosen"] | Bool[np.ndarray, "rows"] | slice) -> "Both":
+        """Some of the rows."""
+        return Both(self.when.at(rows), self.steps.at(rows))
+
+    def columns(self) -> list[rr.TimeColumn]:
+        """As Rerun takes them."""
+        return [*self.when.columns(), *self.steps.columns()]
+
+
 def when(stamps_ns: Int64[np.ndarray, "rows"], scan_stamps_ns: Int64[np.ndarray, "scans"]) -> When:
     """Rows at ``stamps_ns`` in a recording whose scans were taken at ``scan_stamps_ns``, in order."""
     frames = np.searchsorted(scan_stamps_ns, stamps_ns, side="right") - 1
     return When(np.ascontiguousarray(stamps_ns), np.maximum(frames, 0).astype(np.int64))
 
 
-def send(stream: rr.RecordingStream, entity: str, rows: When, columns: Iterable[rr.ComponentColumn]) -> None:
+def send(stream: rr.RecordingStream, entity: str, rows: Rows, columns: Iterable[rr.ComponentColumn]) -> None:
     """Log whole columns under ``entity``; nothing for no rows."""
     if len(rows):
         stream.send_columns(entity, indexes=rows.columns(), columns=columns, strict=True)

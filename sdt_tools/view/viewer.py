@@ -14,13 +14,16 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Final
 
+import numpy as np
 import rerun_cli
 from rerun.experimental import ViewerClient
 
 from sdt_tools.errors import RunError
+from sdt_tools.view.timeline import ERROR, TIME
 
 START_S: Final = 30.0
 SETTLE_S: Final = 1.0
+LOAD_S: Final = 60.0
 _NOWHERE: Final = "http://127.0.0.1:9"
 """Port 9 (discard) of this machine: nothing listens there."""
 
@@ -46,6 +49,35 @@ def open_window(files: Sequence[Path] = ()) -> int:
             if process.poll() is None:
                 return port
     raise ViewerError("the viewer's window does not open; run `rerun` with the .rrd on a machine with a display")
+
+
+def go_to(port: int, file: Path, time_ns: int, error: int | None = None) -> None:
+    """Set the viewer on ``port``, which shows ``file``, to an error by its number; without, to ``time_ns``.
+
+    Raises ViewerError where the file does not load.
+    """
+    client = ViewerClient.connect(viewer_url(port))
+    wait_until_loaded(client, file)
+    set_place(client, time_ns, error)
+
+
+def wait_until_loaded(client: ViewerClient, file: Path) -> None:
+    """Wait until all of ``file`` is there. Raises ViewerError where it does not come."""
+    deadline = time.monotonic() + LOAD_S
+    while client.get_state().loading:
+        if time.monotonic() > deadline:
+            raise ViewerError(
+                f"{file}: not loaded after {LOAD_S:.0f} s; show fewer scans (--every), or a shorter recording"
+            )
+        time.sleep(0.05)
+
+
+def set_place(client: ViewerClient, time_ns: int, error: int | None = None) -> None:
+    """Go to an error by its number on the timeline ``error``; without, to ``time_ns`` on the timeline ``time``."""
+    if error is None:
+        client.set_time(TIME, timestamp=np.datetime64(time_ns, "ns"), play_state="paused")
+    else:
+        client.set_time(ERROR, sequence=error, play_state="paused")
 
 
 @contextmanager

@@ -10,7 +10,7 @@ from jaxtyping import Int64
 from sdt_tools.view import entities, palette
 from sdt_tools.view.decisions import Labels, ModelTrack
 from sdt_tools.view.palette import Rgb
-from sdt_tools.view.timeline import changes, send, when
+from sdt_tools.view.timeline import Rows, changes, send, when
 
 LINE_HEIGHT: Final = 0.075
 """Height of a line beside the scan, as a share of the reach."""
@@ -24,18 +24,26 @@ def send_words(
     scan_stamps_ns: Int64[np.ndarray, "scans"],
 ) -> None:
     """The label and each model's answer of the moment, one below the other at the top left of the scan."""
+    for number, (entity, stamps_ns, words) in enumerate(lines_of(labels, models)):
+        place = [[-0.7 * reach_m, (-0.96 + LINE_HEIGHT * number) * reach_m]]
+        told = changes(stamps_ns, words)
+        style = rr.Points2D.from_fields(positions=place, radii=-0.1, show_labels=True, draw_order=20.0)
+        stream.log(entity, style, static=True, strict=True)
+        send_line(stream, entity, when(told.stamps_ns, scan_stamps_ns), told.states)
+
+
+def lines_of(labels: Labels, models: Sequence[ModelTrack]) -> list[tuple[str, Int64[np.ndarray, "samples"], list[str]]]:
+    """The lines: for each its entity, and what it says at which stamps."""
     lines: list[tuple[str, Int64[np.ndarray, "samples"], list[str]]] = []
     if labels.names:
         lines.append((entities.SCAN_LABEL_WORDS, labels.stamps_ns, [f"label: {name}" for name in labels.names]))
-    lines += [(entities.scan_words(track.model), track.stamps_ns, _answers(track)) for track in models]
-    for number, (entity, stamps_ns, words) in enumerate(lines):
-        place = [[-0.7 * reach_m, (-0.96 + LINE_HEIGHT * number) * reach_m]]
-        told = changes(stamps_ns, words)
-        colors = palette.packed(_color_of(state) for state in told.states)
-        style = rr.Points2D.from_fields(positions=place, radii=-0.1, show_labels=True, draw_order=20.0)
-        stream.log(entity, style, static=True, strict=True)
-        columns = [*rr.Points2D.columns(labels=told.states), *rr.Points2D.columns(colors=colors)]
-        send(stream, entity, when(told.stamps_ns, scan_stamps_ns), columns)
+    return lines + [(entities.scan_words(track.model), track.stamps_ns, _answers(track)) for track in models]
+
+
+def send_line(stream: rr.RecordingStream, entity: str, rows: Rows, words: Sequence[str]) -> None:
+    """What one line says; nothing where it is empty."""
+    colors = palette.packed(_color_of(state) for state in words)
+    send(stream, entity, rows, [*rr.Points2D.columns(labels=words), *rr.Points2D.columns(colors=colors)])
 
 
 def _answers(track: ModelTrack) -> list[str]:

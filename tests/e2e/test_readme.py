@@ -40,6 +40,7 @@ SMALLER = {
     "--out analysis/my_certified\n": "--out analysis/my_certified --epochs 2 --delta 1000\n",
     "--export analysis/my_certified_onnx": "--export analysis/my_certified_onnx --restarts 1 --steps 1",
     "analysis/practice --level 3": "analysis/practice --level 3 --restarts 1 --steps 1 --near-scans 4",
+    "--out analysis/suspects.csv": "--out analysis/suspects.csv --folds 2 --epochs 1",
     "--figures": "--figures --scenario plain --seeds 1000",
 }
 
@@ -64,7 +65,7 @@ def workplace(tmp_path: Path) -> Path:
 
 
 def test_the_commands_run_in_the_order_they_are_given(workplace: Path) -> None:
-    assert len(blocks()) == 9
+    assert len(blocks()) == 12
     script = "".join(blocks())
     for said, small in SMALLER.items():
         script = script.replace(said, small)

@@ -127,6 +127,8 @@ def _verdict(
     interval = _effect_interval(recordings, inside, rng) if 0 < frames < len(inside) else None
     if with_frames < options.min_recordings or frames < MIN_FRAMES:
         reason = f"only {frames} frames of {with_frames} confirming recordings lie inside"
+    elif frames < options.min_support * len(inside):
+        reason = f"only {frames / len(inside):.2%} of the confirming frames lie inside"
     elif not is_conditional(recordings.loss, inside, eta):
         reason = "on the confirming recordings the mean loss is not above eta inside and below it outside"
     elif with_errors < options.min_recordings:

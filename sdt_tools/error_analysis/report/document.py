@@ -2,21 +2,16 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Final
 
 import numpy as np
-import polars as pl
 
 from sdt_tools.error_analysis.conditions.confirmation import Verdict
 from sdt_tools.error_analysis.definitions import ErrorOptions, Tag
 from sdt_tools.error_analysis.distance import Epsilon
 from sdt_tools.error_analysis.explain import Explanation
 from sdt_tools.error_analysis.labelled import LabelledFrames
-from sdt_tools.error_analysis.tagging import tag_columns
 from sdt_tools.recording.incomplete import Incomplete
 from sdt_tools.statistics import wilson
-
-KEY_COLUMNS: Final = ("recording", "recording_id", "stamp_ns", "model", "label", "predicted")
 
 
 @dataclass(frozen=True)
@@ -118,15 +113,6 @@ def summarise(
         warnings=tuple(_warnings(frames, explanation)),
         incomplete=incomplete,
     )
-
-
-def tag_table(frames: LabelledFrames, explanation: Explanation) -> pl.DataFrame:
-    """One row a frame: its key, loss, tag, the literal Definition 1, neighbours, and membership of each condition."""
-    keys = frames.table.select(KEY_COLUMNS)
-    losses = pl.DataFrame({"loss": frames.loss, "error": frames.wrong})
-    inside = {f"condition_{number}": mask for number, mask in enumerate(explanation.search.inside, start=1)}
-    columns = [keys, losses, tag_columns(explanation.tagged, frames.wrong), pl.DataFrame(inside)]
-    return pl.concat(columns, how="horizontal")
 
 
 def _warnings(frames: LabelledFrames, explanation: Explanation) -> list[str]:

@@ -94,6 +94,19 @@ def read_segment(view: memoryview, segment: Segment) -> bytes | memoryview:
     return data
 
 
+def stored(view: memoryview, segment: Segment) -> memoryview | None:
+    """What ``segment`` holds, where it lies in the file uncompressed; not held against a checksum. Else None."""
+    end = segment.offset + segment.length
+    if segment.loose:
+        return view[segment.offset : end]
+    head = segment.offset + _CHUNK_HEAD.size
+    if segment.cut or head + 8 > end:
+        return None
+    compressed = _CHUNK_HEAD.unpack_from(view, segment.offset)[6]
+    (length,) = struct.unpack_from("<Q", view, head)
+    return None if compressed or head + 8 + length > end else view[head + 8 : head + 8 + length]
+
+
 def is_checked(view: memoryview, offset: int) -> bool:
     """Whether the segment at ``offset`` is a chunk with a checksum, not a run of messages."""
     return view[offset] != Opcode.MESSAGE and _CHUNK_HEAD.unpack_from(view, offset)[5] != 0

@@ -32,6 +32,7 @@ from sdt_tools.recording.container.chunk import (
 from sdt_tools.recording.container.extents import Extent, indexed_extents
 from sdt_tools.recording.container.file import MAGIC
 from sdt_tools.recording.container.index import read_index
+from sdt_tools.recording.container.places import Places, Unpack, find_places, message_data
 from sdt_tools.recording.container.records import HEAD, FileIndex
 
 _log = logging.getLogger(__name__)
@@ -212,6 +213,14 @@ class McapReader:
             and (end_ns is None or segment.start_ns < end_ns)
         ]
         return sorted(chosen, key=lambda segment: (segment.start_ns, segment.offset))
+
+    def places(self, channel_ids: Set[int]) -> Places:
+        """Where the messages of some channels lie, and when they were taken."""
+        return find_places(self._view, self.segments(channel_ids), channel_ids, self.unpacked)
+
+    def data_at(self, places: Places, row: int, unpack: Unpack) -> bytes | None:
+        """What message ``row`` of ``places`` holds; None where its chunk, opened by ``unpack``, is damaged."""
+        return message_data(self._view, places.segments[int(places.owners[row])], int(places.starts[row]), unpack)
 
     def unpacked(self, segment: Segment) -> bytes | memoryview | None:
         """The records in ``segment``; None, a warning, and an entry in ``damage`` where they cannot be had."""

@@ -69,7 +69,7 @@ def test_a_model_that_never_stops_fails_where_something_is_near(analysed: tuple[
     document = analysed[0].document()
     assert (document["frames"], document["errors"], document["tags"]["conditional"]) == (200, 70, 70)
     (condition,) = document["conditions"]
-    assert condition["text"] == "front_range_m < 1"
+    assert condition["text"] == "motion = stay"
     assert condition["recordings"] == 5
     assert condition["effect"] == pytest.approx(1.0)
     assert condition["frames"] == condition["errors"] == 70
@@ -77,7 +77,8 @@ def test_a_model_that_never_stops_fails_where_something_is_near(analysed: tuple[
 
 def test_the_folder_holds_tags_report_and_figures(analysed: tuple[ErrorReport, Path], material: Material) -> None:
     _, out = analysed
-    assert sorted(path.name for path in out.iterdir()) == ["epsilon.png", "errors.json", "tags.parquet", "tags.png"]
+    files = ["epsilon.png", "errors.json", "report.html", "tags.parquet", "tags.png"]
+    assert sorted(path.name for path in out.iterdir()) == files
     document = json.loads((out / "errors.json").read_text())
     assert document["options"] == OPTIONS.model_dump(mode="json")
     assert len(document["inputs"]["recordings"]) == 10
@@ -92,7 +93,7 @@ def test_the_folder_holds_tags_report_and_figures(analysed: tuple[ErrorReport, P
 def test_cross_entropy_gives_the_same_errors_under_a_fitting_eta(material: Material) -> None:
     options = ErrorOptions(loss="cross_entropy", eta=1.5)
     report = report_of(material.predictions, material, options)
-    assert [condition.verdict.condition.text for condition in report.conditions] == ["front_range_m < 1"]
+    assert [condition.verdict.condition.text for condition in report.conditions] == ["motion = stay"]
 
 
 def test_one_recording_is_analysed_without_conditions(material: Material, tmp_path: Path) -> None:
@@ -232,7 +233,7 @@ def test_the_verb_shows_tags_and_conditions(
     arguments = ("--recordings", material.recordings, "--out", tmp_path / "errors")
     assert run(monkeypatch, "errors", material.predictions, *arguments) == 0
     shown = capsys.readouterr().err
-    assert "front_range_m < 1" in shown
+    assert "motion = stay" in shown
     assert "conditional" in shown
 
 

@@ -1,57 +1,34 @@
 import numpy as np
 import polars as pl
-import pytest
-from planted import OPTIONS, Planted, autoregressive, drives, plant, table, with_errors
 
 from sdt_tools.error_analysis.conditions.search import find_conditions
 from sdt_tools.error_analysis.definitions import ErrorOptions, Tag
 from sdt_tools.error_analysis.explain import explain
 from sdt_tools.error_analysis.neighbours import build_index
+from sdt_tools.error_analysis.selftest.material import Material, with_errors
 from sdt_tools.error_analysis.tagging import error_neighbours, tag_errors
 
+OPTIONS = ErrorOptions()
 
-def assert_found(planted: Planted, *tags: Tag) -> None:
-    scores = planted.scores()
-    assert set(scores) == set(tags)
-    for precision, recall in scores.values():
-        assert precision >= 0.9
-        assert recall >= 0.9
+
+def drives(seed: int, recordings: int = 20, frames: int = 100) -> tuple[pl.DataFrame, np.ndarray]:
+    """Predictions without errors, and their situations."""
+    return Material(recordings=recordings, frames=frames).table_and_scans(np.random.default_rng(seed), OPTIONS)
 
 
 def line(positions_m: list[float], wrong: list[int], seconds: float = 0.1, **options: object):
     """Tags of one recording with a flat scan a frame, under ε = 0.1 m."""
-    rows = table(np.random.default_rng(0), 1, len(positions_m))
+    rows, _ = drives(0, 1, 2 * len(positions_m))
+    rows = rows.head(len(positions_m))
     rows = rows.with_columns(stamp_ns=(np.arange(len(positions_m)) * seconds * 1e9).astype(np.int64))
-    frames = with_errors(rows, np.isin(np.arange(len(positions_m)), wrong))
+    frames = with_errors(rows, np.isin(np.arange(len(positions_m)), wrong), OPTIONS)
     scans = np.repeat(np.array(positions_m)[:, None], 4, axis=1).astype(np.float32)
     return explain(frames, scans, ErrorOptions(epsilon_m=0.1, **options)).tagged
 
 
-def test_conditional_errors_alone() -> None:
-    assert_found(plant(1, conditional=True), Tag.CONDITIONAL)
-
-
-def test_transient_errors_alone() -> None:
-    assert_found(plant(3, transient=40), Tag.TRANSIENT)
-
-
-def test_isolated_errors_alone() -> None:
-    assert_found(plant(5, isolated=25), Tag.ISOLATED)
-
-
-def test_bursts_alone_stay_unexplained() -> None:
-    assert_found(plant(7, bursts=15), Tag.UNEXPLAINED)
-
-
-@pytest.mark.parametrize("seed", [9, 10])
-def test_all_kinds_together(seed: int) -> None:
-    planted = plant(seed, conditional=True, bursts=15, isolated=25, transient=40)
-    assert_found(planted, Tag.CONDITIONAL, Tag.UNEXPLAINED, Tag.ISOLATED, Tag.TRANSIENT)
-
-
 def test_a_model_that_is_always_wrong_is_systematically_wrong() -> None:
     rows, scans = drives(11, recordings=8, frames=40)
-    tagged = explain(with_errors(rows, np.ones(len(rows), bool)), scans, OPTIONS).tagged
+    tagged = explain(with_errors(rows, np.ones(len(rows), bool), OPTIONS), scans, OPTIONS).tagged
     assert tagged.count(Tag.SYSTEMATIC) == len(rows)
     assert set(tagged.selection) == {"all"}
 
@@ -59,7 +36,7 @@ def test_a_model_that_is_always_wrong_is_systematically_wrong() -> None:
 def test_a_scenario_that_is_always_wrong_is_named() -> None:
     rows, scans = drives(12, recordings=9, frames=40)
     wrong = (rows["scenario"] == "through_gate").to_numpy()
-    tagged = explain(with_errors(rows, wrong), scans, OPTIONS).tagged
+    tagged = explain(with_errors(rows, wrong, OPTIONS), scans, OPTIONS).tagged
     assert np.array_equal(np.array(tagged.tag) == Tag.SYSTEMATIC, wrong)
     assert set(tagged.selection) == {"", "scenario = through_gate"}
 
@@ -68,7 +45,7 @@ def test_right_frames_in_a_systematic_selection_stay_correct() -> None:
     rows, scans = drives(13, recordings=4, frames=40)
     wrong = (rows["recording"] == "drive_001").to_numpy()
     wrong[np.flatnonzero(wrong)[7]] = False
-    tagged = explain(with_errors(rows, wrong), scans, ErrorOptions(tau=0.05)).tagged
+    tagged = explain(with_errors(rows, wrong, OPTIONS), scans, ErrorOptions(tau=0.05)).tagged
     assert np.array_equal(np.array(tagged.tag) == Tag.SYSTEMATIC, wrong)
 
 
@@ -107,11 +84,11 @@ def test_frames_beyond_a_gap_are_not_just_before_or_after() -> None:
 
 
 def test_inside_a_condition_only_an_implausible_lone_error_is_transient() -> None:
-    rows = table(np.random.default_rng(0), 2, 60)
+    rows = pl.concat(by_recording.head(60) for by_recording in drives(0, 2, 100)[0].partition_by("recording"))
     wrong = np.zeros(120, bool)
     wrong[5] = True
     wrong[60::3] = True  # the condition's errors, among them frame 90
-    frames = with_errors(rows, wrong)
+    frames = with_errors(rows, wrong, OPTIONS)
     at = np.concatenate([np.linspace(0, 0.08, 60), 1.0 + np.arange(60)])
     at[89], at[91] = at[90] - 0.05, at[90] + 0.05
     scans = np.repeat(at[:, None], 4, axis=1).astype(np.float32)
@@ -125,30 +102,14 @@ def test_inside_a_condition_only_an_implausible_lone_error_is_transient() -> Non
 
 def test_with_few_recordings_nothing_is_confirmed_and_that_is_said() -> None:
     rows, _ = drives(14, recordings=4, frames=60)
-    search = find_conditions(with_errors(rows, (rows["operator_range_m"] < 1.0).to_numpy()), OPTIONS)
+    search = find_conditions(with_errors(rows, (rows["operator_range_m"] < 1.0).to_numpy(), OPTIONS), OPTIONS)
     assert search.verdicts == ()
     assert "no condition can be confirmed with fewer than 8" in search.note
 
 
-@pytest.mark.parametrize("kind", ["alike", "correlated", "in bad recordings"])
-def test_errors_without_a_cause_seldom_yield_a_condition(kind: str) -> None:
-    found = 0
-    for seed in range(3):
-        rng = np.random.default_rng(100 + seed)
-        rows = table(rng, 24, 80)
-        if kind == "alike":
-            wrong = rng.random(len(rows)) < 0.3
-        elif kind == "correlated":
-            wrong = np.concatenate([autoregressive(rng, 80, 0.9) for _ in range(24)]) > 0.4
-        else:
-            wrong = rng.random(len(rows)) < np.repeat(np.where(rng.random(24) < 0.25, 0.85, 0.03), 80)
-        found += bool(find_conditions(with_errors(rows, wrong), OPTIONS).confirmed)
-    assert found == 0
-
-
 def test_the_same_seed_gives_the_same_conditions() -> None:
     rows, _ = drives(15)
-    frames = with_errors(rows, (rows["operator_range_m"] < 1.0).to_numpy())
+    frames = with_errors(rows, (rows["operator_range_m"] < 1.0).to_numpy(), OPTIONS)
     first, second = (find_conditions(frames, OPTIONS).verdicts for _ in range(2))
     assert first == second
 
@@ -157,15 +118,15 @@ def test_the_order_of_rows_does_not_matter() -> None:
     rows, _ = drives(16)
     wrong = pl.Series("wrong", rows["operator_range_m"] < 1.0)
     mixed = rows.with_columns(wrong).sample(fraction=1.0, shuffle=True, seed=1)
-    there = find_conditions(with_errors(rows, wrong.to_numpy()), OPTIONS)
-    here = find_conditions(with_errors(mixed, mixed["wrong"].to_numpy()), OPTIONS)
+    there = find_conditions(with_errors(rows, wrong.to_numpy(), OPTIONS), OPTIONS)
+    here = find_conditions(with_errors(mixed, mixed["wrong"].to_numpy(), OPTIONS), OPTIONS)
     assert there.verdicts == here.verdicts
 
 
 def test_an_epsilon_that_leaves_no_neighbours_leaves_lone_errors_isolated_and_bursts_unexplained() -> None:
-    rows, scans = drives(13, recordings=4, frames=50)
+    rows, scans = drives(13, recordings=4, frames=70)
     lone, burst = [20, 70, 120], [160, 161, 162]
-    frames = with_errors(rows, np.isin(np.arange(len(rows)), lone + burst))
+    frames = with_errors(rows, np.isin(np.arange(len(rows)), lone + burst), OPTIONS)
     tagged = explain(frames, scans, ErrorOptions(epsilon_m=1e-5)).tagged
     assert [tagged.tag[frame] for frame in lone] == [Tag.ISOLATED] * 3
     assert [tagged.tag[frame] for frame in burst] == [Tag.UNEXPLAINED] * 3
@@ -175,7 +136,7 @@ def test_an_epsilon_that_leaves_no_neighbours_leaves_lone_errors_isolated_and_bu
 def test_under_an_epsilon_larger_than_everything_only_a_single_error_is_transient() -> None:
     rows, scans = drives(14, recordings=4, frames=50)
     for wrong, tag in (([20], Tag.TRANSIENT), ([20, 120], Tag.UNEXPLAINED)):
-        frames = with_errors(rows, np.isin(np.arange(len(rows)), wrong))
+        frames = with_errors(rows, np.isin(np.arange(len(rows)), wrong), OPTIONS)
         tagged = explain(frames, scans, ErrorOptions(epsilon_m=100.0)).tagged
         assert [tagged.tag[frame] for frame in wrong] == [tag] * len(wrong)
         assert tagged.neighbours[20] == len(rows) - 1

@@ -42,7 +42,13 @@ def frames() -> FrameSet:
     ranges_m = 6.0 + rng.uniform(-0.5, 0.5, (12, 541))
     ranges_m[10, 200] = 0.4
     labels = np.array([int(FORWARD), int(STAY)] * 6)
-    return FrameSet(ranges_m=ranges_m, labels=labels, stamps_ns=np.arange(12), recordings=("drawn",) * 12)
+    return FrameSet(
+        ranges_m=ranges_m,
+        labels=labels,
+        stamps_ns=np.arange(12),
+        recordings=("drawn",) * 12,
+        recording_ids=("id",) * 12,
+    )
 
 
 def everything(ranges_m: Tensor) -> Tensor:

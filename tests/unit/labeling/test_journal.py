@@ -9,9 +9,9 @@ import polars as pl
 import pytest
 
 from sdt_tools.errors import LabelError
-from sdt_tools.labeling.acts import HEADER
+from sdt_tools.labeling.acts import HEADER, fault_in, parse_acts
 from sdt_tools.labeling.journal import Journal, Label, read_journal
-from sdt_tools.labeling.vocabulary import LabelSource
+from sdt_tools.labeling.vocabulary import LabelKind, LabelSource
 
 RECORDING = "6f1c0a52-0000-4000-8000-000000000001"
 
@@ -263,7 +263,7 @@ LABELER_PROGRAM = """
 import sys
 from pathlib import Path
 from sdt_tools.labeling.journal import Journal
-from sdt_tools.labeling.vocabulary import LabelSource
+from sdt_tools.labeling.vocabulary import LabelKind, LabelSource
 _, path, recording, labeler, count = sys.argv
 with Journal(Path(path), recording) as journal:
     for stamp_ns in range(int(count)):
@@ -295,3 +295,62 @@ def test_two_programs_at_once_lose_nothing_and_a_killed_one_keeps_what_it_said(t
     assert on_disk["killed"][: len(shown)] == shown
     assert len(on_disk["killed"]) <= len(shown) + 1
     assert table["act_id"].to_list() == list(range(1, len(table) + 1))
+
+
+def test_news_are_what_others_have_appended_once(tmp_path: Path) -> None:
+    with Journal(tmp_path / "x.motion.csv", "r") as mine, Journal(tmp_path / "x.motion.csv", "r") as other:
+        say(mine, 1, "stay")
+        assert mine.news().is_empty()
+        say(other, 2, "stay")
+        say(other, 3, "stay")
+        say(mine, 4, "stay")  # continues after theirs, and does not lose them
+        assert mine.news()["stamp_ns"].to_list() == [2, 3]
+        assert mine.news().is_empty()
+        assert mine.last_act == 4
+        say(other, 5, "stay")
+        assert mine.news()["act_id"].to_list() == [5]
+
+
+def test_what_was_there_before_is_no_news(tmp_path: Path) -> None:
+    with Journal(tmp_path / "x.motion.csv", "r") as before:
+        say(before, 1, "stay")
+    with Journal(tmp_path / "x.motion.csv", "r") as after:
+        assert after.opened.table["stamp_ns"].to_list() == [1]
+        assert after.news().is_empty()
+    with pytest.raises(LabelError, match="closed"):
+        after.news()
+
+
+FIELDS = ["1", "r", "5", "stay", "anna", "human", "0"]
+WRONG = [
+    "",
+    "x",
+    "-1",
+    "1.5",
+    "٣",
+    "9" * 18,
+    "9" * 19,
+    "9" * 30,
+    "r",
+    "stay",
+    "fly",
+    " ",
+    "anna",
+    "truth",
+    "a,b",
+    "\ufffd",
+]
+
+
+@pytest.mark.parametrize("place", range(7))
+@pytest.mark.parametrize("value", WRONG)
+def test_a_line_of_its_own_is_judged_as_in_a_table(place: int, value: str) -> None:
+    text = ",".join([*FIELDS[:place], value, *FIELDS[place + 1 :]])
+    path = Path("x.motion.csv")
+    try:
+        alone = fault_in(text, LabelKind.MOTION, "r", 0) is None and text.isprintable() and "\ufffd" not in text
+        parse_acts(f"{text}\n".encode(), path, "r", 1, 0)
+    except LabelError:
+        assert not alone
+    else:
+        assert alone

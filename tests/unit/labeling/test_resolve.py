@@ -46,6 +46,15 @@ def test_humans_who_disagree_leave_the_stamp_open_until_they_agree() -> None:
     assert resolved(*quarrel, (5, "", "anna", "human")) == [(5, "forward", "human", "ben")]
 
 
+def test_what_somebody_settles_stands_above_those_who_disagree_until_it_is_withdrawn() -> None:
+    quarrel = [(5, "backward", "scene", "truth"), (5, "stay", "anna", "human"), (5, "forward", "ben", "human")]
+    settled = [*quarrel, (5, "left_forward", "settled:carol", "human")]
+    assert resolved(*settled) == [(5, "left_forward", "human", "settled:carol")]
+    assert disagreements(acts(*settled)).is_empty()
+    assert resolved(*settled, (5, "stay", "settled:dora", "human"))[0][1] == "stay"
+    assert resolved(*settled, (5, "", "settled:carol", "human")) == []
+
+
 def test_of_other_sources_that_disagree_the_latest_stands() -> None:
     assert resolved((5, "stay", "a", "model"), (5, "forward", "b", "model")) == [(5, "forward", "model", "b")]
 

@@ -127,3 +127,24 @@ def test_a_place_where_nothing_can_be_made_is_named(tmp_path: Path) -> None:
         scratch_folder(tmp_path / "file" / "new.mcap"),
     ):
         pass
+
+
+def test_nobody_sweeps_away_a_folder_that_is_being_made(tmp_path: Path) -> None:
+    out = tmp_path / "new.mcap"
+    troubles: list[Exception] = []
+
+    def work() -> None:
+        for _ in range(60):
+            try:
+                with scratch_folder(out) as folder:
+                    (folder / "part").write_text("mine")
+            except (OSError, RecordingError) as error:
+                troubles.append(error)
+
+    threads = [threading.Thread(target=work) for _ in range(8)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    assert troubles == []
+    assert list(tmp_path.iterdir()) == []

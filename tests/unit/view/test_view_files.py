@@ -42,7 +42,7 @@ def test_journals_predictions_and_an_analysis_come_together(viewed: Viewed, tmp_
         out,
         labels_dir=tmp_path / "labels",
         predictions=[tmp_path / "p.parquet"],
-        tags=[tmp_path / "errors"],
+        errors=[tmp_path / "errors"],
     )
     assert summary.models == ("follow-0",)
     states = [state for _, _, (state,) in rows(out, "model/follow-0/tag", "StateChange:state")]

@@ -68,6 +68,8 @@ def test_the_layout_gives_each_thing_its_view(viewer: ViewerClient, viewed: View
         ("Loss (cross-entropy)", "TimeSeries"),
         ("Range ahead and speed", "TimeSeries"),
         ("Log", "TextLog"),
+        ("This error", "TextDocument"),
+        ("Errors (a number leads to it)", "TextLog"),
     }
     assert [report.summary for view in views for report in view.reports] == []
 
@@ -93,6 +95,13 @@ def test_an_error_changes_the_colour_of_the_scan(viewer: ViewerClient, viewed: V
     assert len(where(below_the_words, STATUSES["transient"])) > 60
     assert len(where(below_the_words, STATUSES["correct"])) == 0
     assert len(where(below_the_words, LABEL)) > 50
+
+
+def test_a_step_to_an_error_shows_its_scan(viewer: ViewerClient, viewed: Viewed, screen: Screen) -> None:
+    show(viewer, viewed.rrd, error=1)
+    image = screen("Scan")
+    assert len(where(image[image.shape[0] // 4 :], STATUSES["transient"])) > 60
+    assert len(where(screen("This error"), (255, 255, 255), tolerance=60)) > 50
 
 
 def test_the_picture_is_seen(viewer: ViewerClient, viewed: Viewed, screen: Screen) -> None:

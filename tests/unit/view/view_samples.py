@@ -149,13 +149,23 @@ def rows(rrd: Path, entity: str, component: str, static: bool = False) -> list[t
         if chunk.entity_path != f"/{entity}" or chunk.is_static != static:
             continue
         batch = chunk.to_record_batch()
-        if component not in batch.schema.names:
+        if component not in batch.schema.names or (not static and "time" not in batch.schema.names):
             continue
         values = batch.column(component).to_pylist()
         times = [0] * len(values) if static else batch.column("time").cast("int64").to_pylist()
         frames = [0] * len(values) if static else batch.column("frame").to_pylist()
         found += zip(times, frames, values, strict=True)
     return sorted(found, key=lambda row: row[:2])
+
+
+def at_errors(rrd: Path, entity: str, component: str) -> list[tuple[int, list]]:
+    """(number of the error, values) of each row of a component on the timeline that steps through errors, in order."""
+    found = []
+    for chunk in RrdReader(rrd).stream().to_chunks():
+        batch = chunk.to_record_batch()
+        if chunk.entity_path == f"/{entity}" and {component, "error"} <= set(batch.schema.names):
+            found += zip(batch.column("error").to_pylist(), batch.column(component).to_pylist(), strict=True)
+    return sorted(found, key=lambda row: row[0])
 
 
 def entities_of(rrd: Path) -> set[str]:

@@ -77,6 +77,11 @@ def test_frames_in_too_few_recordings_are_not_enough() -> None:
     assert verdict.p_adjusted is None
 
 
+def test_a_sliver_of_the_frames_is_not_enough() -> None:
+    inside = np.arange(4000) % 150 == 0
+    assert judged(inside, inside).reason == "only 0.68% of the confirming frames lie inside"
+
+
 def test_bursts_that_the_condition_only_meets_are_not_confirmed() -> None:
     """Three of six recordings fail throughout, and the condition lies in them by chance alone."""
     number = np.arange(600) // 100

@@ -4,7 +4,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from sdt_tools.error_analysis.conditions.predicates import Condition, Predicate, features_of, simplest_between
+from sdt_tools.error_analysis.conditions.predicates import Condition, Features, Predicate, features_of, simplest_between
 from sdt_tools.errors import UsageError
 
 TABLE = pl.DataFrame(
@@ -28,6 +28,41 @@ def inside(*predicates: Predicate) -> list[bool]:
 def test_a_condition_reads_as_a_sentence() -> None:
     condition = Condition((Predicate("front_range_m", "<", 0.62), Predicate("motion", "=", "forward")))
     assert condition.text == "front_range_m < 0.62 and motion = forward"
+
+
+def test_an_interval_reads_as_one() -> None:
+    condition = Condition(
+        (Predicate("x", "<", 0.62), Predicate("motion", "in", ("forward", "stay")), Predicate("x", ">=", 0.3))
+    )
+    assert condition.text == "0.3 <= x < 0.62 and motion in {forward, stay}"
+
+
+def test_one_of_several_names_is_enough() -> None:
+    assert inside(Predicate("motion", "in", ("forward", "stay"))) == [True, True, False, True]
+    assert Predicate.among("motion", ("stay",)) == Predicate("motion", "=", "stay")
+
+
+PREDICATES = st.sampled_from(
+    [Predicate("x", side, bound) for side in ("<", ">=") for bound in (-0.7, -0.4, -0.1, 0.0, 0.2, 0.5, 0.6)]
+    + [Predicate("|x|", side, bound) for side in ("<", ">=") for bound in (0.2, 0.4, 0.6)]
+)
+
+
+@given(st.lists(PREDICATES, min_size=1, max_size=4))
+def test_leaving_out_the_magnitude_keeps_the_frames(predicates: list[Predicate]) -> None:
+    condition = Condition(()).joined(tuple(predicates))
+    values = np.linspace(-1.0, 1.0, 401) + 1e-4  # none on a bound: |x| < b leaves out -b, x >= -b does not
+    features = Features(401, {"x": values, "|x|": np.abs(values)}, {}, {})
+    plain = condition.plain()
+    assert np.array_equal(plain.mask(features), condition.mask(features))
+    sides = {(predicate.feature, predicate.side) for predicate in plain.predicates}
+    assert len(sides) == len(plain.predicates)
+    assert ("|x|", "<") not in sides or not {("x", "<"), ("x", ">=")} & sides
+
+
+def test_bounds_and_a_magnitude_read_as_an_interval() -> None:
+    condition = Condition((Predicate("x", ">=", -0.19), Predicate("|x|", "<", 0.38)))
+    assert condition.plain().text == "-0.19 <= x < 0.38"
 
 
 def test_a_condition_holds_where_all_its_predicates_do() -> None:
@@ -68,7 +103,7 @@ def test_a_feature_that_predictions_lack_is_an_error_that_lists_those_they_have(
 def test_joining_keeps_the_tighter_bound() -> None:
     wide = Condition((Predicate("front_range_m", "<", 2.0), Predicate("front_range_m", ">=", 0.1)))
     joined = wide.joined((Predicate("front_range_m", "<", 0.9), Predicate("front_range_m", ">=", 0.05)))
-    assert joined.text == "front_range_m < 0.9 and front_range_m >= 0.1"
+    assert joined.text == "0.1 <= front_range_m < 0.9"
 
 
 @given(st.floats(-50, 50), st.floats(1e-9, 10))

@@ -1,7 +1,7 @@
 """From the robot's frames to a screen on which ahead is up and left is left; all shapes are polylines in metres.
 
-Rerun's plane view has x to the right and y *down*. A point that is x ahead and y to the left is therefore drawn at
-(-y, -x).
+Rerun's plane view, like SVG and terminals, has x to the right and y *down*. A point that is x ahead and y to the left
+is therefore drawn at (-y, -x).
 """
 
 import math

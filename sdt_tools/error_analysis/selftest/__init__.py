@@ -1,0 +1,1 @@
+"""Errors of known cause, planted into predictions, and how well they are found again."""
