@@ -3,6 +3,7 @@
 import itertools
 import math
 
+import pytest
 from pytest_benchmark.fixture import BenchmarkFixture
 
 from sdt_tools.frames import Gesture, Pose2D
@@ -49,6 +50,29 @@ def test_render_and_encode(benchmark: BenchmarkFixture) -> None:
     if benchmark.stats is not None:
         benchmark.extra_info["frames_per_s"] = 1 / benchmark.stats.stats.median
         benchmark.extra_info["jpeg_bytes"] = len(data)
+
+
+@pytest.mark.parametrize("name", ["artificial_light_follow", "direct_sunlight"])
+def test_render_video(benchmark: BenchmarkFixture, name: str) -> None:
+    """Flicker, or glare and shadows; exposure and the blur of turning in both."""
+    layout = layout_for(name, 7)
+    camera, robot = SceneCamera(layout), layout.robot
+    x_m, y_m = layout.operator.path_m[0]
+    frames = itertools.count()
+
+    def one() -> None:
+        frame = next(frames)
+        seen_from = Pose2D(robot.x_m, robot.y_m, robot.yaw_rad + 0.1 * math.sin(0.2 * frame))
+        operator = Pose2D(x_m, y_m, robot.yaw_rad + math.pi)
+        gesture, turn_radps = list(Gesture)[frame % 3], 0.8 * math.cos(0.2 * frame)
+        camera.render(seen_from, operator, 0.3 * frame, 0.5, gesture, 1.0, frame / 30, frame, turn_radps=turn_radps)
+
+    one()
+    benchmark(one)
+
+    if benchmark.stats is not None:
+        benchmark.extra_info["frames_per_s"] = 1 / benchmark.stats.stats.median
+        benchmark.extra_info["best_frames_per_s"] = 1 / benchmark.stats.stats.min
 
 
 def test_a_new_scene(benchmark: BenchmarkFixture) -> None:

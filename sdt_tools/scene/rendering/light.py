@@ -13,6 +13,8 @@ from sdt_tools.scene.layout import Sun, Wall
 
 _DEEP_INSIDE: Final = 0.07
 """The share of daylight far from every opening of a roofed place."""
+_FALLS_OFF_M: Final = 1.1
+"""How far from an opening it has fallen to 1/e of what it was."""
 
 
 @dataclass(frozen=True)
@@ -56,12 +58,14 @@ class Roof:
         for way, is_open in zip(ways, self.open_sides, strict=True):
             if is_open:
                 to_opening = np.minimum(to_opening, way)
-        return np.where(inside, _DEEP_INSIDE + (1.0 - _DEEP_INSIDE) * np.exp(-np.maximum(to_opening, 0.0) / 1.1), 1.0)
+        falls_off = np.exp(-np.maximum(to_opening, 0.0) / _FALLS_OFF_M)
+        share: Float64[np.ndarray, "points"] = np.where(inside, _DEEP_INSIDE + (1.0 - _DEEP_INSIDE) * falls_off, 1.0)
+        return share
 
     def covers(self, x_m: float, y_m: float) -> bool:
         """Whether the point lies under the roof."""
         x0, y0, x1, y1 = self.rectangle_m
-        return x0 < x_m < x1 and y0 < y_m < y1
+        return bool(x0 < x_m < x1 and y0 < y_m < y1)
 
 
 @dataclass(frozen=True, eq=False)
@@ -100,7 +104,8 @@ class Light:
                 return sky + self.power * direct
             # A wall's two sides stand on one line: what faces inwards is inside.
             share = self.roof.daylight(points_m + 0.02 * normals)
-            return sky * share + self.power * direct * (share >= 1.0)
+            lit: Float64[np.ndarray, "points"] = sky * share + self.power * direct * (share >= 1.0)
+            return lit
         for lamp in self.lamps_m:
             way = lamp - points_m
             square = np.maximum((way**2).sum(axis=1), 0.25)
@@ -129,7 +134,8 @@ def roof_over(walls: Sequence[Wall]) -> Roof:
     def is_open(axis: int, at: float) -> bool:
         low, high = (x0, x1) if axis == 1 else (y0, y1)
         along = ends[np.all(np.abs(ends[:, :, axis] - at) < 0.1, axis=1)][:, :, 1 - axis]
-        return float(np.abs(along[:, 1] - along[:, 0]).sum()) < 0.6 * (high - low)
+        closed_m = float(np.abs(along[:, 1] - along[:, 0]).sum())
+        return closed_m < 0.6 * float(high - low)
 
     return Roof((x0, y0, x1, y1), (is_open(0, x0), is_open(1, y0), is_open(0, x1), is_open(1, y1)))
 
