@@ -70,9 +70,9 @@ def _show(summary: "VisionAttackSummary") -> None:
     console.print(
         f"{summary.model} answers {summary.answered_rightly} of {summary.images} images rightly; of these are turned:"
     )
-    table = Table("attack", "steps of colour", "from", "into")
-    for heading in ("images", "turned", "share", "95 % interval"):
-        table.add_column(heading, justify="right")
+    table = Table("attack", "by", "from", "into")
+    for heading in ("images", "turned", "share", "interval"):
+        table.add_column(heading, justify="right", no_wrap=True)
     for rate in summary.rates:
         low, high = rate.wilson
         table.add_row(
@@ -86,3 +86,4 @@ def _show(summary: "VisionAttackSummary") -> None:
             f"{low:.0%} to {high:.0%}",
         )
     console.print(table)
+    console.print("by so many steps of 8-bit colour at most; intervals of 95 %")

@@ -104,9 +104,10 @@ def _settings(config: Path | None, backbone: str | None, asked: "Mapping[str, ob
 
     if config is not None and backbone is not None:
         raise UsageError(f"--backbone: {config} says already what the network is; leave one of them out")
-    epsilon = asked.get("adversarial.epsilon", 0)
+    epsilon, epochs = asked.get("adversarial.epsilon", 0), asked.get("epochs")
     assert isinstance(epsilon, int)
-    base = load_config(VisionTrainingConfig, config) if config else vision_recipe(backbone or "lite0", epsilon)
+    assert epochs is None or isinstance(epochs, int)
+    base = load_config(VisionTrainingConfig, config) if config else vision_recipe(backbone or "lite0", epsilon, epochs)
     values = base.model_dump(mode="json", exclude_none=True)
     for name, value in asked.items():
         *tables, key = name.split(".")

@@ -95,6 +95,9 @@ def attack_vision(
     for done, (method, epsilon, aim) in enumerate(tasks):
         report(done, len(tasks))
         places = right if aim is None else disabling
+        if not len(places):
+            rates.append(_rate(method, epsilon, aim, np.zeros(0, np.bool_)))
+            continue
         asked = config.model_copy(update={"method": method, "epsilon": epsilon})
         found = attack_images(model.network, _tensor(images_u8[places]), torch.from_numpy(labels[places]), asked, aim)
         rates.append(_rate(method, epsilon, aim, found.succeeded.numpy()[np.isin(places, right)]))

@@ -32,7 +32,7 @@ SMALLER = {
     "--out analysis/my_follow": "--out analysis/my_follow --epochs 1",
     "seq 100 159": "seq 100 103",
     "--seconds 30": "--seconds 9",
-    "--out analysis/gestures": "--out analysis/gestures --val-share 0.5",
+    "--out analysis/gestures": "--out analysis/gestures --val-share 0.5 --seed 1",
     "--out analysis/my_vision": "--out analysis/my_vision --epochs 1 --width 64 --height 48",
     "--out analysis/my_careful_vision": "--out analysis/my_careful_vision --epochs 1 --width 64 --height 48",
     "analysis/my_vision analysis/gestures": "analysis/my_vision analysis/gestures --images 6 --steps 1",

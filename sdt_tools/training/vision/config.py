@@ -45,14 +45,14 @@ class VisionTrainingConfig(Config):
     preprocess: ImagePreprocessConfig = ImagePreprocessConfig()
     pretrained: bool = True
     weights: Path | None = None
-    last_blocks: int = Field(default=2, ge=0)
-    epochs: int = Field(default=16, ge=1)
+    last_blocks: int = Field(default=5, ge=0)
+    epochs: int = Field(default=7, ge=1)
     batch_size: int = Field(default=32, ge=1)
     adversarial: AdversarialConfig = AdversarialConfig()
     views: ViewConfig = ViewConfig()
-    learning_rate: LearningRateConfig = LearningRateConfig(peak=1e-3, warm_up_share=0.1, decay_share=0.6)
+    learning_rate: LearningRateConfig = LearningRateConfig(peak=5e-4, warm_up_share=0.1, decay_share=0.6)
     weight_decay: float = Field(default=0.01, ge=0.0)
-    label_smoothing: float = Field(default=0.05, ge=0.0, lt=1.0)
+    label_smoothing: float = Field(default=0.1, ge=0.0, lt=1.0)
     gradient_norm: float = Field(default=5.0, gt=0.0)
 
     @model_validator(mode="after")
@@ -65,14 +65,21 @@ class VisionTrainingConfig(Config):
 
 
 BACKBONES: Final = ("lite0", "resnet50")
+_ATTACKED_EPOCHS: Final = 12
 
 
-def vision_recipe(backbone: str, epsilon: int) -> VisionTrainingConfig:
-    """The settings that a training without a configuration starts from. Raises UsageError for an unknown backbone."""
+def vision_recipe(backbone: str, epsilon: int, epochs: int | None = None) -> VisionTrainingConfig:
+    """The settings that a training without a configuration starts from; a third of an attacked one's epochs are plain.
+
+    Raises UsageError for an unknown backbone.
+    """
     if backbone not in BACKBONES:
         raise UsageError(f"--backbone {backbone}: no such backbone; choose {' or '.join(BACKBONES)}")
     architecture = LiteConfig() if backbone == "lite0" else ResNetConfig()
     plain = VisionTrainingConfig(architecture=architecture, preprocess=preprocess_for(architecture, 256, 192))
     if epsilon == 0:
         return plain
-    return plain.model_copy(update={"adversarial": AdversarialConfig(epsilon=epsilon, plain_epochs=8)})
+    planned = _ATTACKED_EPOCHS if epochs is None else epochs
+    return plain.model_copy(
+        update={"epochs": planned, "adversarial": AdversarialConfig(epsilon=epsilon, plain_epochs=planned // 3)}
+    )

@@ -24,7 +24,7 @@ class ViewConfig(Config):
     zoom: float = Field(default=0.1, ge=0.0, lt=0.9)
     turn_deg: float = Field(default=4.0, ge=0.0, le=180.0)
     light: float = Field(default=0.15, ge=0.0, lt=1.0)
-    kept: int = Field(default=4, ge=1)
+    kept: int = Field(default=3, ge=1)
 
 
 def varied(

@@ -7,13 +7,18 @@ import cv2
 import numpy as np
 import polars as pl
 import pytest
-from corner_gestures import TINY_CONFIG, draw_data, write_dataset
+import torch
+from corner_gestures import TINY_CONFIG, draw_data, draw_images, write_dataset
 from rerun.chunk import RrdReader
 from typer.testing import CliRunner
 
 from sdt_tools.cli.attack import app
 from sdt_tools.errors import CheckpointError, DatasetError, OutputExistsError
+from sdt_tools.evaluation.attack_vision import attack_vision
+from sdt_tools.frames import Gesture
 from sdt_tools.models.vision.checkpoint import load_vision_checkpoint
+from sdt_tools.models.vision.loaded import ready_to_answer
+from sdt_tools.robustness.image_attacks import ImageAttackConfig
 from sdt_tools.robustness.image_figure import magnified_mask, probabilities
 from sdt_tools.training.vision.train import train_vision
 
@@ -80,10 +85,23 @@ def test_existing_output_and_the_wrong_network_are_refused(model: Path, dataset:
         run(model, tmp_path / "none")
 
 
-def test_without_images_of_disable_there_is_nothing_to_show(model: Path, dataset: Path, tmp_path: Path) -> None:
-    from sdt_tools.evaluation.attack_vision import attack_vision
-    from sdt_tools.robustness.image_attacks import ImageAttackConfig
+def test_a_network_that_is_always_wrong_has_nothing_to_count(model: Path, tmp_path: Path) -> None:
+    """The pictures are bright below, as for disable, and labelled so; the network is made to say idle to everything."""
+    loaded = load_vision_checkpoint(model)
+    loaded.network.classifier.weight.zero_()
+    loaded.network.classifier.bias.copy_(torch.tensor([5.0, 0.0, 0.0]))
+    wrong = ready_to_answer("wrong", loaded.network, loaded.card)
+    images = draw_images(2, 12)
+    disable = images.labels == Gesture.DISABLE
+    shown = (images.images_u8[disable], images.labels[disable])
+    summary, exhibit = attack_vision(wrong, *shown, [1], ImageAttackConfig(steps=1), 3, tmp_path / "out")
+    assert summary.answered_rightly == 0
+    assert {(rate.images, rate.wilson) for rate in summary.rates} == {(0, (0.0, 1.0))}
+    assert not exhibit.succeeded
+    assert "the attack failed" in exhibit.title
 
+
+def test_without_images_of_disable_there_is_nothing_to_show(model: Path, dataset: Path, tmp_path: Path) -> None:
     loaded = load_vision_checkpoint(model)
     images_u8, labels = np.zeros((4, 24, 32, 3), np.uint8), np.full(4, 0)
     with pytest.raises(DatasetError, match="no image of disable"):

@@ -162,6 +162,7 @@ def test_recipes_keep_each_backbones_own_statistics() -> None:
     lite, resnet = vision_recipe("lite0", 0), vision_recipe("resnet50", 2)
     assert lite.preprocess.mean == (127.0, 127.0, 127.0)
     assert resnet.preprocess.mean == (123.675, 116.28, 103.53)
-    assert resnet.adversarial.epsilon == 2
+    assert (resnet.epochs, resnet.adversarial.epsilon, resnet.adversarial.plain_epochs) == (12, 2, 4)
+    assert vision_recipe("lite0", 1, epochs=1).adversarial.plain_epochs == 0
     with pytest.raises(UsageError, match="choose lite0 or resnet50"):
         vision_recipe("vgg", 0)
