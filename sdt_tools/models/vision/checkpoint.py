@@ -28,4 +28,5 @@ def load_vision_checkpoint(folder: Path) -> LoadedVisionModel:
     card = read_card(folder, VisionCard, (VisionNet.kind,))
     network = VisionNet(card.architecture, card.preprocess)
     fill_network(folder, network)
+    network.requires_grad_(False)
     return ready_to_answer(folder.resolve().name, network, card)

@@ -5,6 +5,7 @@ from collections.abc import Sequence
 from typing import Final
 
 from matplotlib.figure import Figure
+from matplotlib.patches import Patch
 from matplotlib.ticker import MaxNLocator, PercentFormatter
 
 from sdt_tools.training.vision.loop import VisionEpoch
@@ -26,7 +27,7 @@ def vision_curve_png(history: Sequence[VisionEpoch], title: str) -> bytes:
         for record in history:
             if record.epsilon:
                 axes.axvspan(record.epoch - 0.5, record.epoch + 0.5, color=_ATTACKED, linewidth=0)
-        axes.plot(epochs, train, color=_TRAIN, marker=".", label="training, as varied and attacked")
+        axes.plot(epochs, train, color=_TRAIN, marker=".", label="training, as varied (and attacked)")
         axes.plot(epochs, val, color=_VAL, marker=".", label="validation, clean")
         axes.set(title=what, xlabel="epoch")
         axes.set_ylim(bottom=0.0)
@@ -35,10 +36,11 @@ def vision_curve_png(history: Sequence[VisionEpoch], title: str) -> bytes:
         axes.spines[["top", "right"]].set_visible(False)
     accuracy.set_ylim(0.0, 1.02)
     accuracy.yaxis.set_major_formatter(PercentFormatter(1.0, decimals=0))
-    loss.legend(loc="upper right", frameon=False)
     last = history[-1]
     said = [f"training: {last.train_accuracy:.1%}", f"validation: {last.val_accuracy:.1%}"]
     accuracy.legend(accuracy.get_lines(), said, loc="lower right", frameon=False)
+    attacked = [Patch(color=_ATTACKED, label="attacked epochs")] if any(record.epsilon for record in history) else []
+    figure.legend(handles=[*loss.get_lines(), *attacked], loc="outside lower center", ncols=3, frameon=False)
     figure.suptitle(title)
     picture = io.BytesIO()
     figure.savefig(picture, format="png", dpi=120)

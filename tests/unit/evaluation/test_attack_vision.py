@@ -20,6 +20,7 @@ from sdt_tools.models.vision.checkpoint import load_vision_checkpoint
 from sdt_tools.models.vision.loaded import ready_to_answer
 from sdt_tools.robustness.image_attacks import ImageAttackConfig
 from sdt_tools.robustness.image_figure import magnified_mask, probabilities
+from sdt_tools.training.schedule import LearningRateConfig
 from sdt_tools.training.vision.train import train_vision
 
 
@@ -27,7 +28,8 @@ from sdt_tools.training.vision.train import train_vision
 def model(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A network that sees the gestures of a picture by a hair, so that few steps of colour turn it."""
     folder = tmp_path_factory.mktemp("attack") / "net"
-    config = TINY_CONFIG.model_copy(update={"epochs": 8})
+    rate = LearningRateConfig(peak=5e-3, warm_up_share=0.1, decay_share=0.6)
+    config = TINY_CONFIG.model_copy(update={"epochs": 8, "learning_rate": rate})
     train_vision(draw_data(), config, folder)
     return folder
 
