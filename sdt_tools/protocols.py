@@ -4,7 +4,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from typing import Protocol, runtime_checkable
 
-from sdt_tools.frames import CameraImage, LidarScan, MotionClass, RawPicture, Received, Twist
+from sdt_tools.frames import CameraImage, Gesture, LidarScan, MotionClass, RawPicture, Received, Twist
 
 
 @dataclass(frozen=True)
@@ -77,6 +77,42 @@ class Driver(Protocol):
 
     def decide(self, observation: Observation) -> MotionClass:
         """The motion for the newest data."""
+        ...
+
+
+@dataclass(frozen=True)
+class Choice:
+    """A motion class, which of several drivers has chosen it, and at what share of the class's twist it is driven.
+
+    ``intervention`` says that a person has taken over from a driver that is a program.
+    """
+
+    motion: MotionClass
+    driver: str
+    speed: float = 1.0
+    intervention: bool = False
+
+
+@runtime_checkable
+class Chooser(Protocol):
+    """A driver that says more than a class: persons, and whoever shares the wheel with them."""
+
+    @property
+    def name(self) -> str:
+        """How the driver is called in recordings."""
+        ...
+
+    def choose(self, observation: Observation) -> Choice:
+        """The choice for the newest data."""
+        ...
+
+
+@runtime_checkable
+class Gesturing(Protocol):
+    """Somebody whose gestures can be asked for, as the simulated operator."""
+
+    def show(self, gesture: Gesture) -> None:
+        """Show ``gesture`` now. May be called from any thread."""
         ...
 
 

@@ -48,6 +48,13 @@ def build(
         bool | None,
         typer.Option("--allow-conflicts", help="List such labels in the manifest, do not refuse them."),
     ] = None,
+    interventions: Annotated[
+        bool,
+        typer.Option("--interventions", help="Only frames at which a person took over, labelled by that motion."),
+    ] = False,
+    with_interventions: Annotated[
+        bool, typer.Option("--with-interventions", help="Such frames beside the labelled ones.")
+    ] = False,
     json_output: JsonFlag = False,
 ) -> None:
     """Join scans or pictures with labels, choose frames by the rules, split them by recording, write them down.
@@ -73,7 +80,10 @@ def build(
         "seed": seed,
         "conflict_level": conflict_level,
         "allow_conflicts": allow_conflicts,
+        "interventions": "only" if interventions else "also" if with_interventions else None,
     }
+    if interventions and with_interventions:
+        raise UsageError("--interventions and --with-interventions: choose one, such frames alone or beside others")
     if validation and val_share is not None:
         raise UsageError("--validation and --val-share: choose one, recordings to validate with or a share of them")
     given = {name: value for name, value in options.items() if value is not None}
@@ -102,6 +112,7 @@ def _document(summary: "DatasetSummary") -> dict[str, object]:
         "val_frames": summary.val_frames,
         "counts": summary.counts,
         "conflicts": summary.conflicts,
+        "interventions": summary.interventions,
         "unmatched_labels": summary.unmatched_labels,
         "unreadable_pictures": {name: list(stamps_ns) for name, stamps_ns in summary.unreadable.items()},
         "disputed_stamps": summary.disputed_stamps,
@@ -120,6 +131,7 @@ def _show(summary: "DatasetSummary") -> None:
     table.add_row("all", f"{summary.train_frames:,}", f"{summary.val_frames:,}")
     console.print(table)
     notes = {
+        "motions that people drove after taking over, among the labels": summary.interventions,
         "frames in a safety domain with a label that it forbids, listed in the manifest": summary.conflicts,
         "labels without a scan or readable picture near enough": summary.unmatched_labels,
         "pictures that no decoder reads, left out and named in the manifest": sum(

@@ -8,7 +8,7 @@ from sdt_tools.protocols import Driver
 from sdt_tools.recording.live.drivers import ConstantDriver, ExpertDriver
 from sdt_tools.scene.source import SceneSource
 
-FORMS = "expert, constant:CLASS or policy:MODEL_DIR"
+FORMS = "expert, constant:CLASS, policy:MODEL_DIR, keyboard or gamepad"
 
 
 def make_driver(name: str, source: SceneSource) -> Driver:

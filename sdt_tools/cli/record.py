@@ -11,10 +11,12 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from sdt_tools.cli.console import JsonFlag, console, emit
-from sdt_tools.errors import UsageError
+from sdt_tools.cli.live import Live
+from sdt_tools.errors import OutputExistsError, UsageError
 
 if TYPE_CHECKING:
     from sdt_tools.recording.live.outcome import Ending, RecordingSummary
+    from sdt_tools.recording.live.scene_session import SceneRecordingConfig
 
 KEYS_HELP = (
     "Keys with --session at a terminal: space pauses and resumes, n ends the take and starts the next, k keeps it and "
@@ -43,7 +45,8 @@ def scene(
         float | None, typer.Option(min=0.02, help="How long to record, a take; without, until the scenario ends.")
     ] = None,
     driver: Annotated[
-        str, typer.Option(help="Who drives: expert, constant:CLASS or policy:MODEL_DIR.", metavar="NAME")
+        str,
+        typer.Option(help="Who drives: expert, constant:CLASS, policy:MODEL_DIR, keyboard or gamepad.", metavar="NAME"),
     ] = "expert",
     realtime: Annotated[
         bool, typer.Option("--realtime", help="Keep the pace of real time, instead of running as fast as possible.")
@@ -67,42 +70,52 @@ def scene(
             metavar="TIME",
         ),
     ] = None,
+    cockpit: Annotated[
+        bool,
+        typer.Option("--cockpit", help="See what is recorded, and take over from whoever drives; in real time."),
+    ] = False,
+    gamepad: Annotated[bool, typer.Option("--gamepad", help="In the cockpit, a gamepad drives too.")] = False,
+    hold_s: Annotated[
+        float, typer.Option(min=0.1, max=5.0, help="In the cockpit, how long a motion lasts after its key came once.")
+    ] = 0.6,
+    viewer: Annotated[bool, typer.Option("--viewer", help="Stream live to Rerun, in a window of its own.")] = False,
     json_output: JsonFlag = False,
 ) -> None:
     """Record the simulated robot. The same options give the same bytes, except with --realtime.
 
+    Drivers keyboard and gamepad open the cockpit, in the terminal and in real time; ? shows its keys.
+
     In real time the recording ends, whole, when its disk has no room left. It ends whole on Ctrl-C too, and on SIGTERM
     and SIGHUP (exit codes 143 and 129).
     """
-    from sdt_tools.cli.recording_progress import recording_progress
+    from sdt_tools.cli.seat import in_cockpit
     from sdt_tools.config import load_config, parse_config
     from sdt_tools.recording.live.perturb import PerturbConfig
-    from sdt_tools.recording.live.scene_session import SceneRecordingConfig, record_scene
+    from sdt_tools.recording.live.scene_session import SceneRecordingConfig
     from sdt_tools.scene.config import SceneConfig
 
+    seated = in_cockpit(driver, cockpit, gamepad, perturb)
     values = {
         "scenario": scenario,
         "seed": seed,
         "seconds": seconds,
         "driver": driver,
         "camera": not no_camera,
-        "realtime": realtime,
+        "realtime": realtime or seated,
         "perturb": PerturbConfig() if perturb else None,
         "scene": load_config(SceneConfig, config),
     }
     if (out is None) == (session is None):
         raise UsageError("name either --out, for one recording, or --session, for takes")
+    how = Live(seated, gamepad, hold_s, viewer)
     if session is not None:
-        _scene_session(values, session, resume, keep_last, json_output)
+        _scene_session(values, session, resume, keep_last, how, json_output)
         return
     if resume or keep_last is not None:
         raise UsageError(f"{'--resume' if resume else '--keep-last'} needs --session, the folder of the takes")
-    from sdt_tools.cli.drivers import make_driver
-
     assert out is not None
     recording = parse_config(SceneRecordingConfig, values, "record scene", _OPTIONS)
-    with recording_progress(f"recording {out.name}") as progress:
-        summary = record_scene(recording, out, make_driver, progress=progress)
+    summary = _record_one(recording, out, how)
     with _last_words(summary.ending):
         if json_output:
             emit(_document(out, summary))
@@ -110,8 +123,37 @@ def scene(
             _print(out, summary)
 
 
+def _record_one(config: "SceneRecordingConfig", out: Path, how: Live) -> "RecordingSummary":
+    from sdt_tools.cli.drivers import make_driver
+    from sdt_tools.cli.recording_progress import recording_progress
+    from sdt_tools.cli.seat import seat, viewer_observers
+    from sdt_tools.recording.live.scene_session import record_scene
+
+    observers = viewer_observers(how.viewer, config.scene.motions)
+    if not how.seated:
+        with recording_progress(f"recording {out.name}") as progress:
+            return record_scene(config, out, make_driver, observers(), progress)
+    from sdt_tools.teleop.app.app import drive
+
+    if out.exists():
+        raise OutputExistsError(out)
+    with seat(config.driver, out.name, how) as (cockpit, make_seated):
+        return drive(
+            cockpit,
+            lambda interrupt: record_scene(
+                config,
+                out,
+                make_seated,
+                [cockpit.watch, *observers()],
+                cockpit.watch.tell,
+                cockpit.control,
+                interrupt,
+            ),
+        )
+
+
 def _scene_session(
-    values: Mapping[str, object], folder: Path, resume: bool, keep_last: str | None, json_output: bool
+    values: Mapping[str, object], folder: Path, resume: bool, keep_last: str | None, how: Live, json_output: bool
 ) -> None:
     from sdt_tools.cli.record_takes import print_session, record_takes, session_document
     from sdt_tools.config import parse_config
@@ -119,7 +161,7 @@ def _scene_session(
 
     keep_last_s = None if keep_last is None else seconds_of(keep_last)
     config = parse_config(SceneTakesConfig, {**values, "keep_last_s": keep_last_s}, "record scene", _OPTIONS)
-    summary = record_takes(config, folder, resume)
+    summary = record_takes(config, folder, resume, how)
     with _last_words(summary.ending):
         if json_output:
             emit(session_document(summary))

@@ -7,7 +7,7 @@ from rich.progress import BarColumn, Progress, Task, TextColumn, TimeElapsedColu
 from rich.text import Text
 
 from sdt_tools.cli.console import console
-from sdt_tools.recording.live.disk import WARNING_S
+from sdt_tools.recording.live.disk import disk_words
 from sdt_tools.recording.live.outcome import RecordingProgress
 from sdt_tools.recording.messages.topics import CAMERA_IMAGE, LIDAR_SCAN
 
@@ -51,15 +51,5 @@ def describe(now: RecordingProgress) -> str:
     missing = [f"{now.missing} missing"] if now.missing else []
     late = [f"{now.missed_deadlines} late"] if now.missed_deadlines else []
     size = [f"{now.recorded_s:.1f} s", *rates, f"{now.size_bytes / 1e6:.1f} MB"] if now.size_bytes else []
-    return ", ".join([*state, *size, *lost, *missing, *late, *_disk(now.disk_left_s)])
-
-
-def _disk(left_s: float | None) -> list[str]:
-    """How long the disk lasts; loud where that is not long."""
-    if left_s is None:
-        return []
-    if left_s >= 24 * 3600:
-        return ["disk > 1 day"]
-    if left_s < WARNING_S:
-        return [f"DISK FULL IN {left_s / 60:.1f} min"]
-    return [f"disk {left_s / 3600:.1f} h" if left_s >= 3600 else f"disk {left_s / 60:.0f} min"]
+    disk = [] if now.disk_left_s is None else [disk_words(now.disk_left_s)]
+    return ", ".join([*state, *size, *lost, *missing, *late, *disk])

@@ -54,6 +54,8 @@ class DatasetSummary:
     counts: dict[str, dict[str, int]]
     conflicts: int | None
     """Frames in a safety domain with a forbidden label; None where they were not looked for."""
+    interventions: int
+    """Motions that people drove after taking over, among the labels; 0 where they are not asked for."""
     unmatched_labels: int
     """Labels without a scan or a readable picture near enough."""
     unreadable: dict[str, tuple[int, ...]]
@@ -97,6 +99,11 @@ def build_dataset(
     named = frozenset(recording.recording_id for recording in labelled[len(recordings) :])
     labelled.sort(key=lambda recording: recording.recording_id)
     _refuse_repeated(labelled)
+    if config.interventions == "only" and not any(recording.interventions for recording in labelled):
+        raise DatasetError(
+            "nobody took over in these recordings, so there are no interventions; "
+            "record with --cockpit and a policy, and drive where it errs"
+        )
     selections = select_frames(labelled, config, named)
     kind = LabelKind(config.kind)
     classes = kind.classes
@@ -128,6 +135,7 @@ def build_dataset(
         val_frames=sum(counts[VAL].values()),
         counts=counts,
         conflicts=None if found is None else len(found),
+        interventions=sum(recording.interventions for recording in labelled),
         unmatched_labels=sum(recording.unmatched for recording in labelled),
         unreadable={entry.path.stem: entry.unreadable_ns for entry in labelled if entry.unreadable_ns},
         disputed_stamps=sum(recording.disputed for recording in labelled),

@@ -9,7 +9,9 @@ from jaxtyping import Int64
 
 from sdt_tools.dataset.choice import Pool
 from sdt_tools.dataset.config import DatasetConfig
+from sdt_tools.dataset.interventions import read_interventions, with_interventions
 from sdt_tools.dataset.pictures import picture_stamps
+from sdt_tools.labeling.acts import Acts
 from sdt_tools.labeling.journal import read_journal
 from sdt_tools.labeling.resolve import disagreements, resolve
 from sdt_tools.labeling.vocabulary import LabelKind, journal_path
@@ -33,7 +35,8 @@ class LabelledRecording:
     recording_id: str
     scenario: str
     sha256: str
-    journal: Path
+    journal: Path | None
+    """None where interventions alone label it."""
     journal_sha256: str
     pool: Pool
     positions: Int64[np.ndarray, "frames"]
@@ -42,6 +45,8 @@ class LabelledRecording:
     unreadable_ns: tuple[int, ...]
     """Stamps of pictures that no decoder reads: they are left out."""
     labels: int
+    interventions: int
+    """Motions that a person drove after taking over; 0 where they are not asked for."""
     disputed: int
     """Stamps without a label because humans disagree."""
     broken_lines: int
@@ -56,19 +61,21 @@ class LabelledRecording:
 
 
 def read_labelled(path: Path, labels_dir: Path, config: DatasetConfig) -> LabelledRecording:
-    """Join the frames of the recording at ``path`` with its resolved labels; only their stamps stay in memory.
+    """Join the frames of the recording at ``path`` with its labels; only their stamps stay in memory.
 
     Raises RecordingError or LabelError where either cannot be read.
     """
     kind = LabelKind(config.kind)
-    journal = journal_path(labels_dir, path.stem, kind)
+    journal = None if config.interventions == "only" else journal_path(labels_dir, path.stem, kind)
     with Recording.open(path) as recording:
         recording_id = recording.recording_id
         scenario = recording.session.get("scenario", "")
-        acts = read_journal(journal, recording_id)
+        acts = None if journal is None else read_journal(journal, recording_id)
+        interventions = read_interventions(recording) if config.interventions != "none" else None
         frame_stamps_ns, unreadable_ns = _stamps(recording, kind)
         missing = incomplete(recording)
-    labels = resolve(acts)
+    disputed = None if acts is None else disagreements(acts)
+    labels = _labels(acts, interventions, disputed)
     by_time = np.argsort(frame_stamps_ns, kind="stable")
     pairs = nearest_pairs(labels["stamp_ns"].to_numpy(), frame_stamps_ns[by_time], round(config.tolerance_ms * MS_NS))
     in_time = pairs[np.argsort(pairs[:, 1])]
@@ -81,14 +88,15 @@ def read_labelled(path: Path, labels_dir: Path, config: DatasetConfig) -> Labell
         scenario=scenario,
         sha256=content_hash(path),
         journal=journal,
-        journal_sha256=content_hash(journal),
+        journal_sha256="" if journal is None else content_hash(journal),
         pool=Pool(frame_stamps_ns[positions], codes[in_time[:, 0]]),
         positions=positions,
         recorded=len(frame_stamps_ns),
         unreadable_ns=unreadable_ns,
         labels=len(labels),
-        disputed=disagreements(acts)["stamp_ns"].n_unique(),
-        broken_lines=len(acts.broken_lines),
+        interventions=0 if interventions is None else len(interventions),
+        disputed=0 if disputed is None else disputed["stamp_ns"].n_unique(),
+        broken_lines=0 if acts is None else len(acts.broken_lines),
         incomplete=missing,
     )
 
@@ -99,3 +107,12 @@ def _stamps(recording: Recording, kind: LabelKind) -> tuple[Int64[np.ndarray, "f
         return picture_stamps(recording)
     batches = [batch.stamps_ns.copy() for batch in recording.scan_batches(SCANS_A_BATCH)]
     return np.concatenate(batches) if batches else np.empty(0, dtype=np.int64), ()
+
+
+def _labels(acts: Acts | None, interventions: pl.DataFrame | None, disputed: pl.DataFrame | None) -> pl.DataFrame:
+    """Columns stamp_ns, ascending, and label: from the journal, the interventions, or both."""
+    if acts is None or disputed is None:
+        assert interventions is not None
+        return interventions
+    labels = resolve(acts)
+    return labels if interventions is None else with_interventions(labels, interventions, disputed)

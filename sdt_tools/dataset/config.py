@@ -2,7 +2,7 @@
 
 from typing import Literal
 
-from pydantic import Field
+from pydantic import Field, model_validator
 
 from sdt_tools.config import Config
 
@@ -16,6 +16,11 @@ class DatasetConfig(Config):
 
     kind: Literal["motion", "gesture"] = "motion"
     """What is learnt: motions from scans, or gestures from pictures."""
+    interventions: Literal["none", "only", "also"] = "none"
+    """Frames at which a person took over from a policy, labelled by what he drove: not used, alone, or beside labels.
+
+    Beside labels, people's labels go before them, and they go before all others.
+    """
     tolerance_ms: float = Field(default=10.0, ge=0.0, le=1000.0)
     """A label belongs to a scan or picture that is no farther from it in time: half a period of a scan at 50 Hz."""
     spacing_s: float = Field(default=0.4, ge=0.0)
@@ -31,3 +36,11 @@ class DatasetConfig(Config):
     conflict_level: int = Field(default=3, ge=0, le=4)
     """Level of the safety domains that labels must not contradict."""
     allow_conflicts: bool = False
+
+    @model_validator(mode="after")
+    def _interventions_are_motions(self) -> "DatasetConfig":
+        if self.kind != "motion" and self.interventions != "none":
+            raise ValueError(
+                f"interventions = '{self.interventions}' are motions; they do not fit kind = '{self.kind}'"
+            )
+        return self

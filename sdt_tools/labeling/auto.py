@@ -14,6 +14,7 @@ from sdt_tools.labeling.journal import Journal
 from sdt_tools.labeling.resolve import standing
 from sdt_tools.labeling.vocabulary import LabelKind, LabelSource, journal_path
 from sdt_tools.recording.incomplete import Incomplete, incomplete
+from sdt_tools.recording.live.decide import STOP
 from sdt_tools.recording.live.perturb import PERTURBATION
 from sdt_tools.recording.messages.topics import CAMERA_IMAGE, COMMAND, OPERATOR_STATE
 from sdt_tools.recording.reader import Recording
@@ -30,7 +31,7 @@ _COLUMNS = {"stamp_ns": pl.Int64, "label": pl.String, "labeler": pl.String}
 class AutoLabelSummary:
     """What labeling a recording did. ``labels`` were found, ``appended`` of them were new to the journal.
 
-    ``skipped`` messages gave no label: commands in idle mode, forced, or without the expert's word; images
+    ``skipped`` messages gave no label: commands in idle mode, forced, mere stops, or without the expert's word; images
     without a state.
     """
 
@@ -122,7 +123,7 @@ def _commands(messages: Iterable[object]) -> _Found:
     skipped = 0
     for message in messages:
         if isinstance(message, MotionCommand):
-            if message.mode is Mode.ACTIVE and message.driver != PERTURBATION:
+            if message.mode is Mode.ACTIVE and message.driver not in (PERTURBATION, STOP):
                 labels[message.stamp_ns] = (message.motion.label, message.driver or "unknown")
             else:
                 skipped += 1

@@ -40,7 +40,7 @@ class SceneFilm:
         while (stamp_ns := self._start_ns + round(self._taken * period_ns)) <= now_ns:
             share = 1.0 - (now_ns - stamp_ns) / (STEP_S * SECOND_NS)
             time_s = (stamp_ns - self._start_ns) / SECOND_NS
-            arms = arms_at(world.layout.gestures, world.layout.behaviours, time_s)
+            arms = arms_at(world.gestures, world.layout.behaviours, time_s)
             picture = self._camera.render(
                 between(robot_before, world.robot, share),
                 between(operator_before, world.operator, share),

@@ -52,9 +52,13 @@ def gesture_at(gestures: Sequence[GestureEvent], time_s: float) -> Gesture:
     return Gesture.IDLE
 
 
-def commanded_mode_at(gestures: Sequence[GestureEvent], time_s: float) -> Mode:
-    """What the operator has asked for until ``time_s``; one who never gestures wants the robot active throughout."""
-    mode = Mode.IDLE if gestures else Mode.ACTIVE
+def first_mode(planned: Sequence[GestureEvent]) -> Mode:
+    """What the operator wants at first: one who does not plan to gesture wants the robot active throughout."""
+    return Mode.IDLE if planned else Mode.ACTIVE
+
+
+def commanded_mode_at(gestures: Sequence[GestureEvent], time_s: float, mode: Mode) -> Mode:
+    """What the operator has asked for until ``time_s``, after ``mode`` at first."""
     for event in gestures:
         if event.at_s <= time_s and event.gesture is not Gesture.IDLE:
             mode = Mode.ACTIVE if event.gesture is Gesture.ENABLE else Mode.IDLE

@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator
 from dataclasses import replace
+from queue import SimpleQueue
 from typing import Final, Protocol, runtime_checkable
 
 import numpy as np
@@ -9,6 +10,7 @@ import numpy as np
 from sdt_tools.clock import FAST_EPOCH_NS, SECOND_NS
 from sdt_tools.frames import (
     RAYS,
+    Gesture,
     LidarScan,
     LogEntry,
     LogLevel,
@@ -47,7 +49,9 @@ class Film(Protocol):
 
 
 class SceneSource:
-    """Plays ``layout``: what its sensors say, in order, and the truth beside it. Implements Source and Actuator.
+    """Plays ``layout``: what its sensors say, in order, and the truth beside it.
+
+    Implements Source, Actuator and Gesturing.
 
     Nothing is delayed: every message is received at its own stamp. Scans and poses come at the scan rate, images at the
     image rate, the operator's state with every image, when it changes, and once a second.
@@ -70,6 +74,7 @@ class SceneSource:
         self._state: OperatorState | None = None
         self._ended_at_s: float | None = None
         self._touched = False
+        self._asked: SimpleQueue[Gesture] = SimpleQueue()
 
     @property
     def info(self) -> SourceInfo:
@@ -98,6 +103,10 @@ class SceneSource:
         """Drive with ``twist`` from now on."""
         self._twist = twist
 
+    def show(self, gesture: Gesture) -> None:
+        """Have the operator show ``gesture`` at the next tick. May be called from any thread."""
+        self._asked.put(gesture)
+
     def close(self) -> None:
         """A scene holds nothing open."""
 
@@ -110,6 +119,8 @@ class SceneSource:
     def _tick(self, now_ns: int) -> Iterator[Message | RawPicture]:
         """Advance to the tick at ``now_ns`` and say what has been sensed since the last one."""
         world = self.world
+        while not self._asked.empty():  # nobody else takes
+            world.show(self._asked.get())
         robot_before, operator_before = world.robot, world.operator
         if self._ticks == 0:
             yield from self._introduction()

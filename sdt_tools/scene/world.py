@@ -4,6 +4,7 @@ Poses are in the scenario's frame; the frame "odom" of a recording is the same o
 """
 
 import math
+from dataclasses import replace
 from typing import Final
 
 import numpy as np
@@ -13,13 +14,15 @@ from jaxtyping import Float64
 from sdt_tools.frames import ROBOT_LENGTH_M, ROBOT_WIDTH_M, Gesture, Mode, OperatorState, Pose2D, Twist
 from sdt_tools.scene.config import PHYSICS_HZ, SceneConfig
 from sdt_tools.scene.drive import Drive
-from sdt_tools.scene.gestures import behaviour_at, commanded_mode_at, gesture_at
-from sdt_tools.scene.layout import Layout, lidar_pose
+from sdt_tools.scene.gestures import behaviour_at, commanded_mode_at, first_mode, gesture_at
+from sdt_tools.scene.layout import GestureEvent, Layout, lidar_pose
 from sdt_tools.scene.seeds import Stream, generator
 from sdt_tools.scene.sight import any_visible
 from sdt_tools.scene.walker import Walker
 
 STEP_S: Final = 1.0 / PHYSICS_HZ
+GESTURE_S: Final = 2.0
+"""How long a gesture lasts that is asked for; scenario files have it too."""
 _ROBOT: Final = 1
 """Collision type of the robot; everything else keeps pymunk's 0."""
 _SLOP_M: Final = 0.001
@@ -32,8 +35,9 @@ class World:
     """One scene in motion. ``step`` moves it on by 1/50 s; its state is read from the attributes.
 
     ``robot`` is the pose of the robot's centre, ``lidar_pose`` that of its LiDAR. ``contact`` names the first thing
-    that the robot touched. ``segments`` and ``circles`` are what rays can meet; the last two circles are the
-    operator's legs. They are the world's own arrays, the legs' rows changing with every step: copy them to keep them.
+    that the robot touched. ``gestures`` are those planned and those asked for, in order of time. ``segments`` and
+    ``circles`` are what rays can meet; the last two circles are the operator's legs. They are the world's own arrays,
+    the legs' rows changing with every step: copy them to keep them.
     """
 
     def __init__(self, layout: Layout, config: SceneConfig | None = None) -> None:
@@ -41,6 +45,7 @@ class World:
         self.config = SceneConfig() if config is None else config
         self.steps = 0
         self.contact: str | None = None
+        self.gestures = list(layout.gestures)
         self.segments: Float64[np.ndarray, "segments 4"] = layout.segments()
         self._walker = Walker(layout)
         self._static_circles = layout.circles()
@@ -98,11 +103,21 @@ class World:
 
     def gesture_at(self, time_s: float) -> Gesture:
         """The gesture that he shows at ``time_s``."""
-        return gesture_at(self.layout.gestures, time_s)
+        return gesture_at(self.gestures, time_s)
 
     def commanded_mode_at(self, time_s: float) -> Mode:
         """What he has asked the robot to be until ``time_s``."""
-        return commanded_mode_at(self.layout.gestures, time_s)
+        return commanded_mode_at(self.gestures, time_s, first_mode(self.layout.gestures))
+
+    def show(self, gesture: Gesture) -> None:
+        """Have him show ``gesture`` from now on, for as long as people do; to be idle ends the one that he shows."""
+        now_s = self.time_s
+        begun = sum(one.at_s <= now_s for one in self.gestures)
+        if gesture is not Gesture.IDLE:
+            self.gestures.insert(begun, GestureEvent(now_s, gesture, GESTURE_S))
+        elif begun and self.gesture is not Gesture.IDLE:
+            shown = self.gestures[begun - 1]
+            self.gestures[begun - 1] = replace(shown, lasts_s=now_s - shown.at_s)
 
     def operator_state(self, stamp_ns: int, time_s: float) -> OperatorState:
         """What he shows, does and has asked for at ``time_s``, stamped ``stamp_ns``."""

@@ -53,6 +53,10 @@ class TerminalApp(App[ResultT], Generic[ResultT]):
 
     def on_mount(self) -> None:
         """Listen to SIGTERM."""
+        self.listen_to_signals()
+
+    def listen_to_signals(self) -> None:
+        """Have SIGTERM end the app, as quitting does."""
         with suppress(ValueError, RuntimeError):  # not in the main thread: somebody else listens
             asyncio.get_running_loop().add_signal_handler(signal.SIGTERM, self._terminate)
 

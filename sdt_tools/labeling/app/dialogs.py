@@ -52,7 +52,7 @@ class JumpDialog(ModalScreen[int | None]):
         place = place_of(event.value, self._state)
         if place is None:
             self.query_one(Static).update(f"'{event.value[:20]}' is no time: 12.5 · 1:02.5 · +3 · -3 · #120 · 50%")
-        else:
+        elif self.is_current:  # a key that repeats must not close what is below
             self.dismiss(place)
 
 
@@ -80,8 +80,9 @@ class ReviewDialog(ModalScreen[ReviewItem | None]):
 
     @on(OptionList.OptionSelected)
     def choose(self, event: OptionList.OptionSelected) -> None:
-        """Give the item."""
-        self.dismiss(self.items[event.option_index])
+        """Give the item, once."""
+        if self.is_current:
+            self.dismiss(self.items[event.option_index])
 
     def _title(self) -> str:
         if not self.items:
@@ -104,11 +105,16 @@ class HelpDialog(ModalScreen[None]):
     HelpDialog Static {{ width: 1fr; }}
     HelpDialog Horizontal {{ height: auto; }}
     """
-    BINDINGS: ClassVar[list[BindingType]] = [("escape,question_mark,enter,space", "dismiss")]
+    BINDINGS: ClassVar[list[BindingType]] = [("escape,question_mark,enter,space", "close")]
 
     def __init__(self, kind: LabelKind) -> None:
         super().__init__()
         self._kind = kind
+
+    def action_close(self) -> None:
+        """Close, once."""
+        if self.is_current:
+            self.dismiss()
 
     def compose(self) -> Iterable[Widget]:
         """Two columns."""

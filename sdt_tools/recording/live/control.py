@@ -21,6 +21,8 @@ class Wish(StrEnum):
     DISCARD = "discard"
     """The take that runs, or the last one kept, goes to the trash."""
     MARK = "mark"
+    NOTE = "note"
+    """A line for the log, about the controls themselves."""
     SAVE = "save"
     """What the ring holds is written out."""
     QUIT = "quit"
@@ -29,7 +31,7 @@ class Wish(StrEnum):
 
 @dataclass(frozen=True)
 class Act:
-    """A wish; ``text`` is that of a mark, or why the ring is to be saved."""
+    """A wish; ``text`` is that of a mark or note, or why the ring is to be saved."""
 
     wish: Wish
     text: str = ""

@@ -2,12 +2,18 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Final
 
 from sdt_tools.clock import SECOND_NS
-from sdt_tools.config import MotionConfig
-from sdt_tools.frames import CameraImage, LidarScan, Message, MotionClass, MotionCommand
-from sdt_tools.protocols import Driver, Expert, Observation
+from sdt_tools.config import MotionConfig, RateConfig
+from sdt_tools.frames import CameraImage, LidarScan, Message, MotionClass, MotionCommand, Twist
+from sdt_tools.protocols import Choice, Chooser, Driver, Expert, Observation
 from sdt_tools.recording.live.perturb import PERTURBATION
+
+STOP: Final = "stop"
+"""The driver's name in commands that only stop the robot: nobody's idea of what is right there."""
+BLIND_S: Final = 0.2
+"""A robot that has seen nothing for so long stands, or for two and a half scans where they come more slowly."""
 
 Perturb = Callable[[MotionClass], MotionClass]
 """What to drive instead of a driver's choice."""
@@ -17,7 +23,7 @@ Perturb = Callable[[MotionClass], MotionClass]
 class Deciders:
     """Who chooses the motion, who knows the right one, and what disturbs the choice."""
 
-    driver: Driver
+    driver: Driver | Chooser
     expert: Expert | None = None
     perturb: Perturb | None = None
 
@@ -28,23 +34,27 @@ class DecisionLoop:
     A decision that could not be made within its period is left out and counts as ``missed``, from the first one on.
     """
 
-    def __init__(self, deciders: Deciders, motions: MotionConfig, follow_hz: float, start_ns: int) -> None:
+    def __init__(self, deciders: Deciders, motions: MotionConfig, rates: RateConfig, start_ns: int) -> None:
         self.decisions = 0
         self.forced = 0
         self.missed = 0
         self._deciders = deciders
         self._motions = motions
-        self._period_ns = SECOND_NS / follow_hz
+        self._period_ns = SECOND_NS / rates.follow_hz
+        self._blind_ns = round(max(BLIND_S, 2.5 / rates.scan_hz) * SECOND_NS)
         self._start_ns = start_ns
         self._next: int | None = None
         self._scan: LidarScan | None = None
         self._image: CameraImage | None = None
         self._decided_on: LidarScan | None = None
+        self._seen_ns = start_ns
+        self._moving = False
 
-    def see(self, message: Message) -> None:
-        """Keep the newest scan and image."""
+    def see(self, message: Message, now_ns: int) -> None:
+        """Keep the newest scan and image, received by ``now_ns``."""
         if isinstance(message, LidarScan):
             self._scan = message
+            self._seen_ns = now_ns
         elif isinstance(message, CameraImage):
             self._image = message
 
@@ -57,20 +67,43 @@ class DecisionLoop:
         self.missed += due - expected
         self._next = due + 1
         self._decided_on = self._scan
-        return self._command(self._scan, Observation(now_ns, self._scan, self._image))
+        command = self._command(self._scan, Observation(now_ns, self._scan, self._image))
+        self._moving = command.motion is not MotionClass.STAY
+        return command
+
+    def blind(self, now_ns: int) -> bool:
+        """Whether the robot drives although no scan has come for ``BLIND_S``."""
+        return self._moving and now_ns - self._seen_ns > self._blind_ns
+
+    def stop(self, now_ns: int) -> MotionCommand | None:
+        """The command that stops the robot, stamped ``now_ns``; None where it stands already."""
+        if not self._moving:
+            return None
+        self._moving = False
+        return MotionCommand(now_ns, MotionClass.STAY, self._motions.twist(MotionClass.STAY), STOP)
 
     def _command(self, scan: LidarScan, observation: Observation) -> MotionCommand:
         deciders = self._deciders
         expert = None if deciders.expert is None else deciders.expert.advise()
-        chosen = deciders.driver.decide(observation)
-        motion = chosen if deciders.perturb is None else deciders.perturb(chosen)
-        forced = motion is not chosen
+        driver = deciders.driver
+        choice = (
+            driver.choose(observation)
+            if isinstance(driver, Chooser)
+            else Choice(driver.decide(observation), driver.name)
+        )
+        motion = choice.motion if deciders.perturb is None else deciders.perturb(choice.motion)
+        forced = motion is not choice.motion
         self.decisions += 1
         self.forced += forced
         return MotionCommand(
             stamp_ns=scan.stamp_ns,
             motion=motion,
-            twist=self._motions.twist(motion),
-            driver=PERTURBATION if forced else deciders.driver.name,
+            twist=_at_speed(self._motions.twist(motion), choice.speed),
+            driver=PERTURBATION if forced else choice.driver,
+            intervention=choice.intervention,
             expert=expert,
         )
+
+
+def _at_speed(twist: Twist, speed: float) -> Twist:
+    return twist if speed == 1.0 else Twist(twist.linear_mps * speed, twist.angular_radps * speed)

@@ -39,6 +39,15 @@ class DiskSpace:
         return self.full or (self.left_s is not None and self.left_s < WARNING_S)
 
 
+def disk_words(left_s: float) -> str:
+    """How long the disk lasts, as in ``disk 3.2 h``; loud where that is not long."""
+    if left_s >= 24 * 3600:
+        return "disk > 1 day"
+    if left_s < WARNING_S:
+        return f"DISK FULL IN {left_s / 60:.1f} min"
+    return f"disk {left_s / 3600:.1f} h" if left_s >= 3600 else f"disk {left_s / 60:.0f} min"
+
+
 @dataclass(frozen=True)
 class _Look:
     at_ns: int

@@ -11,14 +11,18 @@ _POLITE: Final = (signal.SIGTERM, signal.SIGHUP)
 
 
 class Interrupt:
-    """Whether somebody wants the recording to end, and by which signal."""
+    """Whether somebody wants the recording to end, and by which signal; or what has failed around it."""
 
     def __init__(self) -> None:
         self.signal: int | None = None
+        self.failure: Exception | None = None
+        """Raised by whoever records, at once: the screen that shows it has failed, say."""
 
     @property
     def requested(self) -> bool:
-        """Whether it was asked for."""
+        """Whether it was asked for. Raises what has failed."""
+        if self.failure is not None:
+            raise self.failure
         return self.signal is not None
 
 

@@ -1,6 +1,6 @@
 """The live loop: reads a source, asks a driver, moves the robot, hands everything to whoever records it."""
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import suppress
 from time import perf_counter
 from typing import Final, Protocol, runtime_checkable
@@ -9,7 +9,7 @@ from sdt_tools.clock import SECOND_NS
 from sdt_tools.errors import RecordingError, RunError, SdtError
 from sdt_tools.frames import LogEntry, LogLevel, RawPicture, Received, Twist
 from sdt_tools.protocols import Actuator, Observer, Source
-from sdt_tools.recording.live.decide import DecisionLoop
+from sdt_tools.recording.live.decide import BLIND_S, DecisionLoop
 from sdt_tools.recording.live.encoder import PictureEncoder
 from sdt_tools.recording.live.interrupt import Interrupt
 from sdt_tools.recording.live.outcome import ENDING_BY_SIGNAL, Ending, RecordingProgress
@@ -99,13 +99,16 @@ class LiveLoop:
         self._progress = progress
         self._encoder = encoder or PictureEncoder(behind=False)
         self._now_ns = source.start_ns
+        self._under_way: tuple[int, Iterator[Received | RawPicture]] | None = None
+        """What is being read, and up to when."""
         self._reported_s = 0.0
         self._stands = False
 
     def run(self, interrupt: Interrupt) -> Ending:
         """Tick until the recorder has enough, the source has ended, or a signal wants it to end.
 
-        The robot stands still before the recorder is told of the end. Raises RunError where the source fails.
+        The robot stands still before the recorder is told of the end, and unless its time was up, so that nothing more
+        belongs to it, the recording says so. Raises RunError where the source fails.
         """
         self._report(at_once=True)
         try:
@@ -122,7 +125,7 @@ class LiveLoop:
                 "what was recorded before is kept"
             ) from error
         try:
-            self._stand_still()
+            self._stand_still(told=ending is not Ending.TIME)
             self.settle()
             if ending in _LAST_WORDS:
                 self._log(LogLevel.INFO, _LAST_WORDS[ending])
@@ -143,7 +146,7 @@ class LiveLoop:
         """Stop the robot, if it does not stand yet, and close what was given."""
         try:
             if not self._stands:
-                self._stand_still()
+                self._stand_still(told=False)
         finally:
             self._encoder.close()
             self._source.close()
@@ -153,7 +156,7 @@ class LiveLoop:
     def _fail(self, error: Exception) -> None:
         try:
             with suppress(OSError, SdtError):  # tried again by ``close``, which says so
-                self._stand_still()
+                self._stand_still(told=True)
             if not isinstance(error, RecordingError):
                 with suppress(SdtError):  # more pictures that cannot be encoded
                     self.settle()
@@ -162,40 +165,60 @@ class LiveLoop:
         finally:
             self._recorder.end(Ending.FAILED, self._now_ns)
 
-    def _stand_still(self) -> None:
+    def _stand_still(self, told: bool) -> None:
+        """Stop the robot; where it moved, have that command pass if it is to be ``told``."""
         self._actuator.command(_STANDSTILL)
         self._stands = True
+        command = self._decisions.stop(self._now_ns)
+        if command is not None and told:
+            self._keep(Received(self._now_ns, command))
 
     def _ticks(self, interrupt: Interrupt) -> Ending:
         recorder = self._recorder
-        while interrupt.signal is None:
+        while not interrupt.requested:
             now_ns = self._pace.next_ns()
             end_ns = recorder.end_ns
-            if end_ns is not None and now_ns >= end_ns:
-                self._read(end_ns - 1)
+            ends = end_ns is not None and now_ns >= end_ns
+            is_read = self._read(now_ns if end_ns is None or not ends else end_ns - 1)
+            if is_read and end_ns is not None and ends:
                 self._now_ns = end_ns
                 self.settle()
                 self._log_all(recorder.time_up(end_ns))
                 if recorder.ending is not None:
                     return recorder.ending
-            self._read(now_ns)
-            if self._source.finished:
+                is_read = self._read(now_ns)
+            if is_read and self._source.finished:
                 return Ending.SOURCE
-            self._drive(now_ns)
-            self._log_all(recorder.tick(now_ns))
+            self._drive(self._now_ns)
+            self._log_all(recorder.tick(self._now_ns))
             if recorder.ending is not None:
                 return recorder.ending
             self._report()
+        assert interrupt.signal is not None
         return ENDING_BY_SIGNAL[interrupt.signal]
 
-    def _read(self, until_ns: int) -> None:
-        self._now_ns = until_ns
-        for sensed in self._source.read(until_ns):
-            if isinstance(sensed, RawPicture):
-                self._encoder.put(sensed)
-            else:
-                self._take(sensed)
-            self._take_pictures()
+    def _read(self, until_ns: int) -> bool:
+        """Read the source up to ``until_ns``, or as far as that does not take long; whether all is read.
+
+        Where it is not, the next call goes on from there, and it is as early as what was read last.
+        """
+        while True:
+            if self._under_way is None:
+                self._under_way = until_ns, iter(self._source.read(until_ns))
+            goal_ns, reading = self._under_way
+            for sensed in reading:
+                self._now_ns = max(self._now_ns, sensed.received_ns)
+                if isinstance(sensed, RawPicture):
+                    self._encoder.put(sensed)
+                else:
+                    self._take(sensed)
+                self._take_pictures()
+                if self._pace.takes_long():
+                    return False
+            self._under_way = None
+            if goal_ns >= until_ns:
+                self._now_ns = goal_ns
+                return True
 
     def _take_pictures(self) -> None:
         """Those that are encoded by now, and those that were dropped, in their order."""
@@ -208,7 +231,7 @@ class LiveLoop:
 
     def _take(self, received: Received) -> None:
         self._keep(received)
-        self._decisions.see(received.message)
+        self._decisions.see(received.message, self._now_ns)
         self._note_missing(topic_of(received.message).name, received.message.stamp_ns)
 
     def _note_missing(self, topic: str, stamp_ns: int) -> None:
@@ -217,8 +240,12 @@ class LiveLoop:
             self._log(LogLevel.WARNING, f"{topic}: {missing} messages missing before {stamp_ns} ns")
 
     def _drive(self, now_ns: int) -> None:
+        if self._decisions.blind(now_ns):
+            self._stand_still(told=True)
+            self._log(LogLevel.WARNING, f"no scan for {BLIND_S:g} s or more: the robot stands until one comes")
         command = self._decisions.decide(now_ns)
         if command is not None:
+            self._stands = False
             self._actuator.command(command.twist)
             self._keep(Received(now_ns, command))
 

@@ -47,6 +47,9 @@ class RecordingProgress:
     disk_left_s: float | None = None
     state: str = ""
     """What is going on where that is not plain recording, as in ``take_003 paused``."""
+    running: bool = True
+    """Whether something is being recorded, or paused."""
+    paused: bool = False
 
 
 @dataclass(frozen=True)

@@ -2,9 +2,12 @@
 
 from collections.abc import Callable
 from time import sleep
-from typing import Protocol, runtime_checkable
+from typing import Final, Protocol, runtime_checkable
 
 from sdt_tools.clock import SECOND_NS, HostClock, Pacer
+
+PATIENCE_S: Final = 0.05
+"""A source that takes longer to read, as a scene on a slow machine, is left for a moment: the driver is to decide."""
 
 
 @runtime_checkable
@@ -18,6 +21,10 @@ class Pace(Protocol):
 
     def next_ns(self) -> int:
         """Wait for the next tick; the stamp up to which the source is to be read."""
+        ...
+
+    def takes_long(self) -> bool:
+        """Whether reading for this tick has taken so long that something else must be done meanwhile."""
         ...
 
 
@@ -36,6 +43,10 @@ class FastPace:
         self._tick += 1
         return self._start_ns + round(self._tick * self._period_ns)
 
+    def takes_long(self) -> bool:
+        """Never: nobody waits."""
+        return False
+
 
 class RealPace:
     """Ticks when their time has come. What a late tick missed is read with it."""
@@ -43,6 +54,7 @@ class RealPace:
     def __init__(self, clock: HostClock, scan_hz: float, sleep_s: Callable[[float], None]) -> None:
         self._clock = clock
         self._pacer = Pacer(round(SECOND_NS / scan_hz), clock, sleep_s)
+        self._released_ns = clock.now_ns()
 
     @property
     def missed(self) -> int:
@@ -52,7 +64,12 @@ class RealPace:
     def next_ns(self) -> int:
         """Wait for the next tick; the host's time then."""
         self._pacer.wait()
-        return self._clock.now_ns()
+        self._released_ns = self._clock.now_ns()
+        return self._released_ns
+
+    def takes_long(self) -> bool:
+        """Whether the tick came ``PATIENCE_S`` ago."""
+        return self._clock.now_ns() - self._released_ns > PATIENCE_S * SECOND_NS
 
 
 def paced(

@@ -7,8 +7,9 @@ from time import sleep
 from sdt_tools.clock import HostClock
 from sdt_tools.config import MotionConfig, RateConfig
 from sdt_tools.errors import RunError
-from sdt_tools.frames import LogEntry, Received
-from sdt_tools.protocols import Actuator, Driver, Expert, Observer, Source
+from sdt_tools.frames import LogEntry, LogLevel, Received
+from sdt_tools.protocols import Actuator, Chooser, Driver, Expert, Observer, Source
+from sdt_tools.recording.live.control import Act, Control, Wish
 from sdt_tools.recording.live.decide import Deciders, DecisionLoop, Perturb
 from sdt_tools.recording.live.disk import DiskWatch
 from sdt_tools.recording.live.encoder import Encode, PictureEncoder, encode_jpeg
@@ -25,7 +26,7 @@ from sdt_tools.recording.writer import RecordingWriter
 def record(
     source: Source,
     actuator: Actuator,
-    driver: Driver,
+    driver: Driver | Chooser,
     expert: Expert | None,
     writer: RecordingWriter,
     observers: Sequence[Observer],
@@ -41,6 +42,7 @@ def record(
     limits: QueueLimits | None = None,
     disk: DiskWatch | None = None,
     encode: Encode = encode_jpeg,
+    control: Control | None = None,
 ) -> RecordingSummary:
     """Record ``source`` for ``seconds`` (without, until it ends) while ``driver`` moves ``actuator``.
 
@@ -48,21 +50,22 @@ def record(
     unless another is given, a thread of its own writes and another one encodes raw pictures by ``encode``: what they
     cannot keep up with is dropped as ``pressure`` says, and the recording ends before the ``disk`` is full. Ctrl-C,
     SIGTERM and SIGHUP end the recording as if its time were up, and the summary says so; ``interrupt`` is what hears
-    them, where the caller listens already. On every way out the robot is told to stand still, and source and observers
-    are closed; the writer is the caller's to close.
+    them, where the caller listens already. Whoever holds ``control`` may pause, mark and end it. On every way out the
+    robot is told to stand still, and source and observers are closed; the writer is the caller's to close.
 
     Raises RunError where the source fails, after a word in ``/session/log``; RecordingError where the disk refuses.
     """
-    decisions = DecisionLoop(Deciders(driver, expert, perturb), motions, rates.follow_hz, source.start_ns)
+    decisions = DecisionLoop(Deciders(driver, expert, perturb), motions, rates, source.start_ns)
     pace = paced(source.start_ns, rates.scan_hz, (clock or HostClock()) if realtime else None, sleep_s)
     sink = QueuedSink(writer, limits, disk) if realtime else DirectSink(writer)
 
     def tally() -> Tally:
         return Tally(decisions.decisions, decisions.forced, pace.missed + decisions.missed)
 
-    recorder = _OneTake(Take(sink, source.start_ns, seconds, rates, tally), writer)
     encoder = PictureEncoder(realtime, limits, encode)
+    recorder = _OneTake(Take(sink, source.start_ns, seconds, rates, tally), writer, control)
     loop = LiveLoop(source, actuator, decisions, pace, observers, recorder, progress, encoder)
+    recorder.settle = loop.settle
     try:
         if interrupt is not None:
             loop.run(interrupt)
@@ -78,13 +81,17 @@ def record(
 
 
 class _OneTake:
-    """Records until the take's time is up."""
+    """Records until the take's time is up, or whoever holds the controls ends it."""
 
-    def __init__(self, take: Take, writer: RecordingWriter) -> None:
+    def __init__(self, take: Take, writer: RecordingWriter, control: Control | None) -> None:
         self.ending: Ending | None = None
         self.summary: RecordingSummary | None = None
+        self.settle: Callable[[], None] = lambda: None
+        """Has all that was received so far recorded."""
         self._take = take
         self._writer = writer
+        self._control = control
+        self._marks = 0
 
     @property
     def end_ns(self) -> int | None:
@@ -104,10 +111,24 @@ class _OneTake:
         return self._take.missing(topic, stamp_ns)
 
     def tick(self, now_ns: int) -> Iterator[LogEntry]:
-        """Watch the writer and the disk."""
+        """Do what is wanted, watch the writer and the disk."""
         yield from self._take.watch(now_ns)
+        for act in self._control.heard() if self._control is not None else ():
+            yield from self._do(act, now_ns)
         if self._take.disk_is_full:
             self.ending = Ending.DISK
+
+    def _do(self, act: Act, now_ns: int) -> Iterator[LogEntry]:
+        self.settle()
+        if act.wish in (Wish.STOP, Wish.QUIT):
+            self.ending = Ending.STOPPED
+        elif act.wish is Wish.MARK:
+            self._marks += 1
+            yield LogEntry(now_ns, LogLevel.INFO, act.text or f"mark {self._marks}", "mark")
+        elif act.wish is Wish.NOTE:
+            yield LogEntry(now_ns, LogLevel.INFO, act.text, "note")
+        else:
+            yield from self._take.hear(act.wish, now_ns)
 
     def time_up(self, now_ns: int) -> list[LogEntry]:
         """Enough."""

@@ -1,6 +1,7 @@
 """A recording of the scene, from its configuration to the closed file."""
 
 from collections.abc import Callable, Sequence
+from contextlib import nullcontext
 from dataclasses import replace
 from pathlib import Path
 
@@ -8,7 +9,9 @@ from pydantic import Field
 
 from sdt_tools.clock import FAST_EPOCH_NS, HostClock
 from sdt_tools.config import Config, dump_config
-from sdt_tools.protocols import Driver, Observer
+from sdt_tools.frames import LidarScan, Received
+from sdt_tools.protocols import Chooser, Driver, Observation, Observer
+from sdt_tools.recording.live.control import Control
 from sdt_tools.recording.live.interrupt import Interrupt, deferred_interrupt
 from sdt_tools.recording.live.outcome import RecordingProgress, RecordingSummary
 from sdt_tools.recording.live.perturb import PerturbConfig, perturbation_of
@@ -38,34 +41,41 @@ class SceneRecordingConfig(Config):
     scene: SceneConfig = SceneConfig()
 
 
+MakeDriver = Callable[[str, SceneSource], Driver | Chooser]
+"""Builds the driver of a name for a scene that is about to begin."""
+
+
 def record_scene(
     config: SceneRecordingConfig,
     out: Path,
-    make_driver: Callable[[str, SceneSource], Driver],
+    make_driver: MakeDriver,
     observers: Sequence[Observer] = (),
     progress: Callable[[RecordingProgress], None] | None = None,
+    control: Control | None = None,
+    interrupt: Interrupt | None = None,
 ) -> RecordingSummary:
-    """Record the scene to ``out``; ``make_driver`` builds the driver of that name for the scene.
+    """Record the scene to ``out``; whoever holds ``control`` may pause, mark and end it.
 
-    Signals are heard until the file is closed. Raises ConfigError for an unknown scenario, OutputExistsError,
-    RecordingError where the disk refuses, and what ``make_driver`` raises.
+    Signals are heard until the file is closed, unless ``interrupt`` hears them already. Raises ConfigError for an
+    unknown scenario, OutputExistsError, RecordingError where the disk refuses, and what ``make_driver`` raises.
     """
-    with deferred_interrupt() as interrupt:
-        return _record_scene(config, out, make_driver, observers, progress, interrupt)
+    with nullcontext(interrupt) if interrupt is not None else deferred_interrupt() as heard:
+        return _record_scene(config, out, make_driver, observers, progress, control, heard)
 
 
 def _record_scene(
     config: SceneRecordingConfig,
     out: Path,
-    make_driver: Callable[[str, SceneSource], Driver],
+    make_driver: MakeDriver,
     observers: Sequence[Observer],
     progress: Callable[[RecordingProgress], None] | None,
+    control: Control | None,
     interrupt: Interrupt,
 ) -> RecordingSummary:
     clock = HostClock()
     layout = layout_for(config.scenario, config.seed)
     if config.realtime:
-        warm_up(layout, config)
+        warm_up(layout, config, make_driver)
     start_ns = clock.now_ns() if config.realtime else FAST_EPOCH_NS
     source = SceneSource(layout, config.scene, config.camera, start_ns)
     driver = make_driver(config.driver, source)
@@ -95,13 +105,21 @@ def _record_scene(
             perturb,
             progress,
             interrupt=interrupt,
+            control=control,
         )
     return replace(summary, size_bytes=writer.size)
 
 
-def warm_up(layout: Layout, config: SceneRecordingConfig) -> None:
-    """Import and compile what the scene needs, so that it can keep the pace from its first second on."""
+def warm_up(layout: Layout, config: SceneRecordingConfig, make_driver: MakeDriver) -> None:
+    """Import and compile what scene and driver need, so that they can keep the pace from their first second on."""
     scene = SceneSource(layout, config.scene, config.camera)
-    for _ in scene.read(scene.start_ns):
-        pass
+    scan = None
+    for sensed in scene.read(scene.start_ns):
+        if isinstance(sensed, Received) and isinstance(sensed.message, LidarScan):
+            scan = sensed.message
     scene.expert.advise()
+    driver, observation = make_driver(config.driver, scene), Observation(scene.start_ns, scan, None)
+    if isinstance(driver, Chooser):
+        driver.choose(observation)
+    else:
+        driver.decide(observation)

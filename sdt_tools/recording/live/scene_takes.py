@@ -1,6 +1,7 @@
 """A session of takes in the scene."""
 
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import nullcontext
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -9,7 +10,7 @@ from pydantic import Field
 from sdt_tools.clock import FAST_EPOCH_NS, HostClock
 from sdt_tools.config import dump_config
 from sdt_tools.errors import RunError
-from sdt_tools.protocols import Driver, Observer
+from sdt_tools.protocols import Observer
 from sdt_tools.recording.live.control import Control
 from sdt_tools.recording.live.decide import Deciders, DecisionLoop
 from sdt_tools.recording.live.encoder import PictureEncoder
@@ -19,7 +20,7 @@ from sdt_tools.recording.live.loop import LiveLoop
 from sdt_tools.recording.live.outcome import ENDING_BY_SIGNAL, Ending, RecordingProgress
 from sdt_tools.recording.live.pace import paced
 from sdt_tools.recording.live.perturb import perturbation_of
-from sdt_tools.recording.live.scene_session import SceneRecordingConfig, warm_up
+from sdt_tools.recording.live.scene_session import MakeDriver, SceneRecordingConfig, warm_up
 from sdt_tools.recording.live.session_folder import SessionFolder, SessionRecord
 from sdt_tools.recording.live.take import Tally
 from sdt_tools.recording.live.takes import TakeRecorder
@@ -51,22 +52,24 @@ class SessionSummary:
 def record_scene_takes(
     config: SceneTakesConfig,
     folder: Path,
-    make_driver: Callable[[str, SceneSource], Driver],
+    make_driver: MakeDriver,
     resume: bool = False,
     control: Control | None = None,
     observers: Callable[[], Sequence[Observer]] = tuple,
     progress: Callable[[RecordingProgress], None] | None = None,
+    interrupt: Interrupt | None = None,
 ) -> SessionSummary:
     """Record takes of the scene into ``folder``; with ``control`` whoever holds it says when they begin and end.
 
     Takes that follow each other lie in one world, whose seed is the config's; when it has ended, the next take begins
-    in a world with the next seed. A session that is resumed goes on with the next seed too.
+    in a world with the next seed. A session that is resumed goes on with the next seed too. Signals are heard here,
+    unless ``interrupt`` hears them already.
 
     Raises RecordingError where ``folder`` holds a session and is not to be resumed, or holds none and is;
     ChangedConfigError where it was begun with another config; else what ``record_scene`` raises.
     """
     session_id = random_id() if config.realtime else derived_id(dump_config(config))
-    with deferred_interrupt() as interrupt:
+    with nullcontext(interrupt) if interrupt is not None else deferred_interrupt() as interrupt:
         session = SessionFolder.resume(folder, config) if resume else SessionFolder.create(folder, config, session_id)
         cut_off = session.cut_off
         keep_last = KeepLast(config.keep_last_s) if config.keep_last_s is not None else None
@@ -90,7 +93,7 @@ def _play_world(
     config: SceneTakesConfig,
     session: SessionFolder,
     recorder: TakeRecorder,
-    make_driver: Callable[[str, SceneSource], Driver],
+    make_driver: MakeDriver,
     interrupt: Interrupt,
     clock: HostClock,
     observers: Sequence[Observer],
@@ -99,13 +102,13 @@ def _play_world(
     seed = config.seed + session.start_world()
     layout = layout_for(config.scenario, seed)
     if config.realtime:
-        warm_up(layout, config)
+        warm_up(layout, config, make_driver)
     start_ns = clock.now_ns() if config.realtime else FAST_EPOCH_NS
     source = SceneSource(layout, config.scene, config.camera, start_ns)
     rates = config.scene.rates
     perturb = perturbation_of(config.perturb, seed, rates.follow_hz)
     deciders = Deciders(make_driver(config.driver, source), source.expert, perturb)
-    decisions = DecisionLoop(deciders, config.scene.motions, rates.follow_hz, start_ns)
+    decisions = DecisionLoop(deciders, config.scene.motions, rates, start_ns)
     pace = paced(start_ns, rates.scan_hz, clock if config.realtime else None)
 
     def open_writer(path: Path, notes: Mapping[str, str], at_ns: int, realtime: bool) -> RecordingWriter:

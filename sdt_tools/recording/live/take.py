@@ -7,12 +7,13 @@ from time import perf_counter
 from sdt_tools.clock import SECOND_NS
 from sdt_tools.config import RateConfig
 from sdt_tools.frames import LogEntry, LogLevel, Received
+from sdt_tools.recording.live.control import Wish
 from sdt_tools.recording.live.disk import DiskSpace
 from sdt_tools.recording.live.gaps import GapCounter
 from sdt_tools.recording.live.outcome import Ending, RecordingProgress, RecordingSummary
 from sdt_tools.recording.live.sink import Sink
 from sdt_tools.recording.messages.topics import CAMERA_IMAGE, LIDAR_SCAN
-from sdt_tools.recording.timing.pauses import PAUSES, pauses_text
+from sdt_tools.recording.timing.pauses import PAUSES, paused_entry, pauses_text, resumed_entry
 from sdt_tools.recording.writer import RecordingWriter
 
 
@@ -116,6 +117,16 @@ class Take:
         self._pauses_ns.append(pause_ns)
         return (pause_ns[1] - pause_ns[0]) / SECOND_NS
 
+    def hear(self, wish: Wish, now_ns: int) -> Iterator[LogEntry]:
+        """Pause or resume, where that is the wish. The entry about a pause is to be recorded before it begins."""
+        if wish is Wish.TOGGLE:
+            wish = Wish.RESUME if self.paused else Wish.PAUSE
+        if wish is Wish.PAUSE and not self.paused:
+            yield paused_entry(now_ns)
+            self.pause(now_ns)
+        elif wish is Wish.RESUME and self.paused:
+            yield resumed_entry(now_ns, self.resume(now_ns))
+
     def watch(self, now_ns: int) -> Iterator[LogEntry]:
         """Keep what was written safe; entries about drops and the disk. Raises what the file's writer raised."""
         self.sink.keep_safe()
@@ -183,6 +194,7 @@ class Take:
             missing=sum(gap.missing for gap in self._gaps.values()),
             disk_left_s=None if space is None else space.left_s,
             state=state,
+            paused=self.paused,
         )
 
 

@@ -19,7 +19,6 @@ from sdt_tools.recording.live.outcome import Ending, RecordingProgress
 from sdt_tools.recording.live.session_folder import SessionFolder
 from sdt_tools.recording.live.sink import DirectSink, QueuedSink
 from sdt_tools.recording.live.take import Take, Tally
-from sdt_tools.recording.timing.pauses import paused_entry, resumed_entry
 from sdt_tools.recording.writer import RecordingWriter
 
 _LISTEN_S: Final = 0.05
@@ -94,7 +93,7 @@ class TakeRecorder:
         progress: Callable[[RecordingProgress], None] | None = None,
     ) -> bool:
         """While no source runs: whether another one is to start, for the next take. False where all is to end."""
-        while self._control is not None and interrupt.signal is None:
+        while self._control is not None and not interrupt.requested:
             self._clerk.check()
             if progress is not None:
                 progress(self._idle("the source has ended"))
@@ -176,7 +175,7 @@ class TakeRecorder:
         return self._running.take.progress(now_ns, f"{self._running.path.stem}{paused}{self._told}")
 
     def _idle(self, state: str) -> RecordingProgress:
-        return RecordingProgress(0.0, None, 0.0, {}, 0, 0, 0, state=f"{state}{self._told}")
+        return RecordingProgress(0.0, None, 0.0, {}, 0, 0, 0, state=f"{state}{self._told}", running=False)
 
     @property
     def _told(self) -> str:
@@ -187,8 +186,6 @@ class TakeRecorder:
         self._settle()  # what was received before the wish belongs to what was before it
         running = self._running
         wish = act.wish
-        if wish is Wish.TOGGLE:
-            wish = Wish.RESUME if running is not None and running.take.paused else Wish.PAUSE
         if wish in (Wish.STOP, Wish.NEXT, Wish.QUIT, Wish.DISCARD):
             yield from self.last_words(now_ns)
         if wish is Wish.DISCARD:
@@ -202,13 +199,12 @@ class TakeRecorder:
             self._marks += 1
             self._done = act.text or f"mark {self._marks}"
             yield LogEntry(now_ns, LogLevel.INFO, self._done, "mark")
+        elif wish is Wish.NOTE:
+            yield LogEntry(now_ns, LogLevel.INFO, act.text, "note")
         elif wish is Wish.SAVE and self._keep_last is not None:
             self._keep_last.trigger(act.text or "a key", now_ns)
-        elif wish is Wish.PAUSE and running is not None and not running.take.paused:
-            yield paused_entry(now_ns)
-            running.take.pause(now_ns)
-        elif wish is Wish.RESUME and running is not None and running.take.paused:
-            yield resumed_entry(now_ns, running.take.resume(now_ns))
+        elif running is not None:
+            yield from running.take.hear(wish, now_ns)
         if wish in (Wish.START, Wish.NEXT) and self._running is None:
             self._start(now_ns)
 

@@ -47,7 +47,7 @@ def test_topics_and_schemas_are_those_of_the_format() -> None:
             "sdt.MotionCommand",
             ["timestamp", "motion", "linear_mps", "angular_radps", "driver", "mode", "intervention", "expert"],
         ),
-        ("sdt.OperatorState", ["timestamp", "gesture", "commanded_mode"]),
+        ("sdt.OperatorState", ["timestamp", "gesture", "commanded_mode", "behaviour"]),
     ],
 )
 def test_our_own_schemas_number_their_fields_from_one_in_order(schema: str, fields: list[str]) -> None:

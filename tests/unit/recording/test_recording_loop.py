@@ -1,5 +1,7 @@
 import signal
 from collections import Counter
+from collections.abc import Iterator
+from contextlib import suppress
 from pathlib import Path
 
 import numpy as np
@@ -10,8 +12,9 @@ from recording_samples import PERIOD_NS, T0, image, scan
 from sdt_tools.clock import SECOND_NS
 from sdt_tools.config import MotionConfig
 from sdt_tools.errors import RecordingError, RunError
-from sdt_tools.frames import MotionClass, MotionCommand, Received, Twist
+from sdt_tools.frames import LidarScan, MotionClass, MotionCommand, Received, Twist
 from sdt_tools.protocols import Observation
+from sdt_tools.recording.live.decide import STOP
 from sdt_tools.recording.live.gaps import GapCounter
 from sdt_tools.recording.live.outcome import Ending, RecordingProgress
 from sdt_tools.recording.live.perturb import Perturbation, PerturbConfig
@@ -61,7 +64,36 @@ def test_nothing_is_decided_before_the_first_scan_or_twice_on_one(tmp_path: Path
     setup = Rig(tmp_path / "r.mcap", TapeSource([image(0), scan(10), scan(40)]))
     setup.run(seconds=1.0)
     commands = [m for m in setup.read() if isinstance(m.message, MotionCommand)]
-    assert [m.message.stamp_ns for m in commands] == [T0 + 10 * PERIOD_NS]
+    assert [m.message.stamp_ns for m in commands if m.message.driver != STOP] == [T0 + 10 * PERIOD_NS]
+
+
+def test_a_robot_that_drives_and_sees_nothing_is_stopped_until_it_sees_again(tmp_path: Path) -> None:
+    setup = Rig(tmp_path / "r.mcap", TapeSource([scan(10), scan(40), scan(50), image(60)]))
+    setup.run(seconds=60.0)
+    commands = [m for m in setup.read() if isinstance(m.message, MotionCommand)]
+    blind, *_ = [m for m in commands if m.message.driver == STOP]
+    assert blind.received_ns == T0 + (10 + 11) * PERIOD_NS
+    assert blind.message.twist == setup.wheels.twists[1] == Twist(0.0, 0.0)
+    assert setup.log()[0].startswith("no scan for 0.2 s")
+    assert [m.message.driver for m in commands] == [
+        "constant:forward",
+        STOP,
+        "constant:forward",
+        "constant:forward",
+        STOP,
+    ]
+
+
+@pytest.mark.parametrize("happens", [{80: signal.SIGHUP}, {80: ConnectionResetError("gone")}, {}])
+def test_whatever_ends_it_before_its_time_the_last_command_is_a_stop(
+    tmp_path: Path, happens: dict[int, BaseException | int]
+) -> None:
+    setup = rig(tmp_path, happens=happens)
+    with suppress(RunError):
+        setup.run(seconds=60.0)
+    commands = [m for m in setup.read() if isinstance(m.message, MotionCommand)]
+    assert [(m.message.driver, m.message.twist) for m in commands[-1:]] == [(STOP, Twist(0.0, 0.0))]
+    assert {m.message.driver for m in commands[:-1]} == {"constant:forward"}
 
 
 def test_it_ends_when_the_source_does(tmp_path: Path) -> None:
@@ -190,6 +222,42 @@ def test_a_slow_driver_in_real_time_loses_decisions_but_no_scan(tmp_path: Path) 
     assert len(scans) >= 49
     assert summary.decisions < 6
     assert summary.missed_deadlines > 10
+
+
+class Toiling(TapeSource):
+    """Takes 30 ms of the clock for each scan of 20 ms: it never keeps up."""
+
+    clock: HandClock
+
+    def read(self, until_ns: int) -> Iterator[Received]:
+        for received in super().read(until_ns):
+            self.clock.sleep(0.03)
+            yield received
+
+
+def toiling(tmp_path: Path, happens: dict[int, int] | None = None) -> tuple[Rig, HandClock]:
+    source = Toiling([scan(n) for n in range(200)], happens or {})
+    source.clock = HandClock()
+    return Rig(tmp_path / "r.mcap", source), source.clock
+
+
+def test_a_source_that_cannot_keep_up_is_driven_all_the_same(tmp_path: Path) -> None:
+    setup, clock = toiling(tmp_path)
+    summary = setup.run(seconds=3.0, realtime=True, clock=clock, sleep_s=clock.sleep)
+    assert (summary.ending, summary.frames["/lidar/scan"]) == (Ending.TIME, 150)
+    assert summary.missed_deadlines > 0
+    passed = [m for m in setup.read() if isinstance(m.message, MotionCommand)]
+    apart_ns = np.diff([m.received_ns for m in passed])
+    assert len(passed) >= 25
+    assert apart_ns.max() <= 8 * PERIOD_NS
+    assert [m.received_ns for m in passed] == sorted(m.received_ns for m in passed)
+
+
+def test_a_source_that_cannot_keep_up_does_not_keep_a_signal_waiting(tmp_path: Path) -> None:
+    setup, clock = toiling(tmp_path, {100: signal.SIGTERM})
+    setup.run(realtime=True, clock=clock, sleep_s=clock.sleep)
+    scans = [m for m in setup.read() if isinstance(m.message, LidarScan)]
+    assert 100 <= len(scans) <= 103
 
 
 def test_progress_tells_where_the_recording_stands(tmp_path: Path) -> None:

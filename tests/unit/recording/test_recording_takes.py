@@ -98,7 +98,7 @@ class Session:
         tape = [Received(T0, m.message) for m in introduction]
         tape += sorted([*messages, *self.extra], key=lambda m: m.received_ns)
         source = TapeSource(tape, self.happens)
-        decisions = DecisionLoop(Deciders(Forward()), MotionConfig(), 10.0, T0)
+        decisions = DecisionLoop(Deciders(Forward()), MotionConfig(), RateConfig(), T0)
         clock = HandClock()
         pace = paced(T0, 50.0, clock if self.realtime else None, clock.sleep)
 

@@ -44,7 +44,11 @@ def test_what_looks_like_a_gesture_is_idle_and_asks_for_nothing() -> None:
     assert behaviour_at(CALLS, 5.0) is Behaviour.PHONE_CALL
     assert behaviour_at(CALLS, 3.9) is None
     assert behaviour_at(CALLS, 6.0) is None
-    assert [commanded_mode_at(GESTURES, time_s) for time_s in (0.0, 5.0, 9.0)] == [Mode.IDLE, Mode.ACTIVE, Mode.IDLE]
+    assert [commanded_mode_at(GESTURES, time_s, Mode.IDLE) for time_s in (0.0, 5.0, 9.0)] == [
+        Mode.IDLE,
+        Mode.ACTIVE,
+        Mode.IDLE,
+    ]
 
 
 def test_varied_gestures_are_half_made_when_they_begin_and_end() -> None:

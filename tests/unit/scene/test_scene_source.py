@@ -16,6 +16,7 @@ from sdt_tools.frames import (
     LidarScan,
     LogEntry,
     Message,
+    Mode,
     MotionClass,
     Odometry,
     OperatorPose,
@@ -24,7 +25,7 @@ from sdt_tools.frames import (
     Received,
     Twist,
 )
-from sdt_tools.protocols import Actuator, Expert, Source
+from sdt_tools.protocols import Actuator, Expert, Gesturing, Source
 from sdt_tools.scene.config import SceneConfig
 from sdt_tools.scene.scenario import layout_for
 from sdt_tools.scene.source import SceneSource
@@ -185,3 +186,23 @@ def test_closing_twice_is_fine() -> None:
     source.command(Twist(0.1, 0.0))
     source.close()
     source.close()
+
+
+def test_a_gesture_that_is_asked_for_is_shown_at_the_next_tick_and_told() -> None:
+    source = SceneSource(layout_for("plain", 1))
+    assert isinstance(source, Gesturing)
+    states = [one for one in sensed(played(source, 0.5)) if isinstance(one, OperatorState)]
+    assert {state.gesture for state in states} == {Gesture.ENABLE}  # as the scenario has it
+    source.show(Gesture.DISABLE)
+    later = [one for one in sensed(list(source.read(source.start_ns + SECOND_NS))) if isinstance(one, OperatorState)]
+    assert (later[0].gesture, later[0].commanded_mode) == (Gesture.DISABLE, Mode.IDLE)
+    assert later[0].stamp_ns - source.start_ns <= SECOND_NS // 2 + 2 * STEP_NS
+
+
+def test_gestures_asked_for_move_neither_robot_nor_operator() -> None:
+    """They have no random numbers of their own: whoever is not asked walks the same way."""
+    quiet, asked = SceneSource(layout_for("plain", 1)), SceneSource(layout_for("plain", 1))
+    asked.show(Gesture.ENABLE)
+    for source in (quiet, asked):
+        played(source, 2.0)
+    assert (quiet.world.robot, quiet.world.operator) == (asked.world.robot, asked.world.operator)

@@ -213,3 +213,25 @@ def test_gestures_change_the_mode_he_has_asked_for() -> None:
 
 def test_one_who_never_gestures_wants_the_robot_active() -> None:
     assert world().commanded_mode is Mode.ACTIVE
+
+
+def test_gestures_may_be_asked_for_beside_those_that_are_planned() -> None:
+    place = world(gestures=(GestureEvent(3.0, Gesture.DISABLE, 1.0),))
+    drive(place, STAY, 1.0)
+    place.show(Gesture.ENABLE)
+    assert (place.gesture, place.commanded_mode) == (Gesture.ENABLE, Mode.ACTIVE)
+    drive(place, STAY, 1.0)
+    place.show(Gesture.IDLE)  # ends it; he has asked for it all the same
+    assert (place.gesture, place.commanded_mode) == (Gesture.IDLE, Mode.ACTIVE)
+    drive(place, STAY, 1.5)
+    assert (place.gesture, place.commanded_mode) == (Gesture.DISABLE, Mode.IDLE)
+    assert place.gesture_at(1.5) is Gesture.ENABLE  # what has been, has been
+
+
+def test_who_shows_nothing_and_is_asked_for_nothing_goes_on_wanting_the_robot_active() -> None:
+    place = world()
+    place.show(Gesture.IDLE)
+    assert (place.gestures, place.commanded_mode) == ([], Mode.ACTIVE)
+    place.show(Gesture.DISABLE)
+    drive(place, STAY, 2.5)
+    assert (place.gesture, place.commanded_mode) == (Gesture.IDLE, Mode.IDLE)
