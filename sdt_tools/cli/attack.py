@@ -5,6 +5,7 @@ from typing import Annotated
 
 import typer
 
+from sdt_tools.cli import attack_vision
 from sdt_tools.cli.console import JsonFlag, console, emit
 
 app = typer.Typer(no_args_is_help=True, help="Search for inputs that networks answer with what is forbidden.")
@@ -13,6 +14,9 @@ app = typer.Typer(no_args_is_help=True, help="Search for inputs that networks an
 @app.callback()
 def attack() -> None:
     """Search for inputs that networks answer with what is forbidden."""
+
+
+app.command("vision")(attack_vision.command)
 
 
 @app.command("follow")

@@ -34,6 +34,15 @@ def progress_bar(what: str) -> Iterator[Callable[[int, int], None]]:
 
 
 @contextmanager
+def epoch_bar(epochs: int) -> Iterator[Callable[[int, str], None]]:
+    """A function to call with an epoch that is done and what came of it; there may be more of them than planned."""
+    columns = (TextColumn("epoch"), MofNCompleteColumn(), BarColumn(), *_COLUMNS[:1], *_COLUMNS[3:])
+    with Progress(*columns, console=console, transient=True, disable=not console.is_terminal) as bar:
+        task = bar.add_task("", total=epochs)
+        yield lambda epoch, text: bar.update(task, completed=epoch, total=max(epochs, epoch), description=text)
+
+
+@contextmanager
 def stage_progress() -> Iterator[Callable[[str, int, int], None]]:
     """A function to call with (stage, done, total): one bar a stage, full when the next begins; else its name alone."""
     with Progress(*_COLUMNS, console=console, disable=not console.is_terminal) as bar:

@@ -5,6 +5,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from sdt_tools.cli import train_vision
 from sdt_tools.cli.console import JsonFlag, console, emit
 
 if TYPE_CHECKING:
@@ -30,6 +31,9 @@ _OPTIONS = _OF_DOMAINS | {
 @app.callback()
 def train() -> None:
     """Train networks on data sets."""
+
+
+app.command("vision")(train_vision.command)
 
 
 @app.command("follow")
@@ -64,17 +68,10 @@ def follow(
 
     Interrupted with Ctrl-C, the same command goes on where it was.
     """
-    from rich.progress import (
-        BarColumn,
-        MofNCompleteColumn,
-        Progress,
-        TextColumn,
-        TimeElapsedColumn,
-        TimeRemainingColumn,
-    )
-
-    from sdt_tools.training.follow import train_follow, unfinished
+    from sdt_tools.cli.progress import epoch_bar
+    from sdt_tools.training.follow import train_follow
     from sdt_tools.training.record import EpochRecord
+    from sdt_tools.training.snapshot import unfinished
 
     asked = {
         "arch": arch,
@@ -88,23 +85,13 @@ def follow(
         "loop.epochs": epochs,
     }
     settings = _settings(config, {name: value for name, value in asked.items() if value is not None})
-    columns = (
-        TextColumn("epoch"),
-        MofNCompleteColumn(),
-        BarColumn(),
-        TextColumn("{task.description}"),
-        TimeElapsedColumn(),
-        TextColumn("eta"),
-        TimeRemainingColumn(),
-    )
-    with Progress(*columns, console=console, transient=True, disable=not console.is_terminal) as bar:
-        task = bar.add_task("", total=settings.loop.epochs)
+    with epoch_bar(settings.loop.epochs) as bar:
 
-        def show(record: EpochRecord, total: int) -> None:
+        def show(record: EpochRecord, _total: int) -> None:
             text = f"loss {record.train_loss:.3f}  validation {record.val_accuracy:.1%}"
             if record.bound is not None:
                 text += f"  bound {record.bound:.2g}  certified {record.certified_share:.0%}"
-            bar.update(task, completed=record.epoch, total=max(total, record.epoch), description=text)
+            bar(record.epoch, text)
 
         try:
             summary = train_follow(dataset, settings, out, show)

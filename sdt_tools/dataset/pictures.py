@@ -36,10 +36,15 @@ def picture_bytes(recording: Recording, positions: Int64[np.ndarray, "chosen"]) 
 
 
 def readable(data: bytes) -> bool:
-    """Whether ``data`` is a whole picture. A JPEG must have its end: decoders make grey of what is missing."""
-    if data.startswith(_JPEG_STARTS) and not data.rstrip(_PADDING).endswith(_JPEG_ENDS):
+    """Whether ``data`` is a whole picture."""
+    if breaks_off(data):
         return False
     return bool(data) and cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_REDUCED_GRAYSCALE_8) is not None
+
+
+def breaks_off(data: bytes) -> bool:
+    """Whether ``data`` is a JPEG without its end: decoders make grey of what is missing."""
+    return data.startswith(_JPEG_STARTS) and not data.rstrip(_PADDING).endswith(_JPEG_ENDS)
 
 
 def _images(recording: Recording) -> Iterator[CameraImage]:

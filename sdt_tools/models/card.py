@@ -8,10 +8,11 @@ from pydantic import Discriminator, Field, JsonValue, Tag
 
 from sdt_tools import __version__
 from sdt_tools.config import Config
-from sdt_tools.frames import MotionClass
+from sdt_tools.frames import Gesture, MotionClass
 from sdt_tools.models.follow_net import FollowNetConfig
 from sdt_tools.models.gated_net import GatedNetConfig
 from sdt_tools.models.preprocess import PreprocessConfig
+from sdt_tools.models.vision.config import Backbone, ImagePreprocessConfig
 
 FORMAT: Final = 1
 
@@ -24,11 +25,11 @@ def _shape_of(architecture: object) -> str:
 Architecture = Annotated[
     Annotated[FollowNetConfig, Tag("plain")] | Annotated[GatedNetConfig, Tag("gate")], Discriminator(_shape_of)
 ]
-"""Shape of a network; that of a gated one has a ``trunk``."""
+"""Shape of a follow network; that of a gated one has a ``trunk``."""
 
 
-class ModelCard(Config):
-    """The content of ``model.toml``.
+class Card(Config):
+    """What the content of every ``model.toml`` has in common.
 
     ``training`` is the resolved configuration of the training, ``dataset_hash`` that of the data set's manifest,
     ``metrics`` numbers by name, as in ``val_accuracy``; tables and lists of them are allowed.
@@ -36,17 +37,30 @@ class ModelCard(Config):
 
     format: int = FORMAT
     kind: str
-    classes: tuple[str, ...] = tuple(motion.label for motion in MotionClass)
     code_version: str = __version__
     seed: int
     dataset: str = ""
     dataset_hash: str = ""
-    architecture: Architecture
-    preprocess: PreprocessConfig
     training: Mapping[str, JsonValue] = Field(default_factory=dict)
     metrics: Mapping[str, JsonValue] = Field(default_factory=dict)
 
 
-def card_to_toml(card: ModelCard) -> str:
+class ModelCard(Card):
+    """The card of a follow network."""
+
+    classes: tuple[str, ...] = tuple(motion.label for motion in MotionClass)
+    architecture: Architecture
+    preprocess: PreprocessConfig
+
+
+class VisionCard(Card):
+    """The card of a vision network."""
+
+    classes: tuple[str, ...] = tuple(gesture.label for gesture in Gesture)
+    architecture: Backbone
+    preprocess: ImagePreprocessConfig
+
+
+def card_to_toml(card: Card) -> str:
     """The card as TOML text."""
     return tomli_w.dumps(card.model_dump(mode="json", exclude_none=True))

@@ -10,16 +10,16 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator, PercentFormatter
 
-from sdt_tools.training.record import EpochRecord
+from sdt_tools.training.record import EpochRecord, Record
 
 _TRAIN, _VAL, _RECALL = "#8a8f98", "#1f6feb", "#7fb0f5"
 _BOUND, _CERTIFIED = "#d1495b", "#2a9d8f"
 
 
-def curve_csv(history: Sequence[EpochRecord]) -> bytes:
+def curve_csv(history: Sequence[Record]) -> bytes:
     """One row an epoch, a header first."""
     text = io.StringIO()
-    writer = csv.DictWriter(text, [field.name for field in fields(EpochRecord)], lineterminator="\n")
+    writer = csv.DictWriter(text, [field.name for field in fields(history[0])], lineterminator="\n")
     writer.writeheader()
     for record in history:
         row = asdict(record)

@@ -16,7 +16,8 @@ from sdt_tools.dataset.load import Dataset, FrameSet, load_dataset
 from sdt_tools.errors import DatasetError
 from sdt_tools.frames import MotionClass
 from sdt_tools.models.card import ModelCard
-from sdt_tools.models.checkpoint import reserve, save_checkpoint
+from sdt_tools.models.checkpoint import save_checkpoint
+from sdt_tools.models.checkpoint_folder import reserve
 from sdt_tools.models.follow_net import FollowNet, FollowNetConfig, new_follow_net
 from sdt_tools.models.gated_net import GateConfig, GatedFollowNet, GatedNetConfig, new_gated_net
 from sdt_tools.models.loaded import logits_of
@@ -27,7 +28,7 @@ from sdt_tools.training.loop import Batch, LoopConfig, LoopResult, run_loop
 from sdt_tools.training.metrics import Score, score
 from sdt_tools.training.record import EpochRecord
 from sdt_tools.training.safety import SafetyConfig, SafetyDomains
-from sdt_tools.training.snapshot import SnapshotFile
+from sdt_tools.training.snapshot import SnapshotFile, unfinished
 from sdt_tools.training.specification import SpecificationConfig, specification
 
 Progress = Callable[[EpochRecord, int], None]
@@ -80,7 +81,8 @@ def train_follow(
     _check_classes(dataset)
     started = time.monotonic()
     network = _new_network(config)
-    snapshot = SnapshotFile(unfinished(out), {"dataset": dataset.hash, **config.model_dump(mode="json")})
+    settings = {"dataset": dataset.hash, **config.model_dump(mode="json")}
+    snapshot = SnapshotFile(unfinished(out), settings, EpochRecord)
     result = _fit(network, dataset, config, progress or _no_progress, snapshot)
     seconds = time.monotonic() - started
     train, val = (_score(network, frames) for frames in (dataset.train, dataset.val))
@@ -90,11 +92,6 @@ def train_follow(
     save_checkpoint(out, network, _card(config, dataset, summary), attachments)
     snapshot.discard()
     return summary
-
-
-def unfinished(out: Path) -> Path:
-    """Where the state of a training is kept that is to become the checkpoint ``out``."""
-    return out.with_name(f"{out.name}.unfinished.safetensors")
 
 
 def _new_network(config: FollowTrainingConfig) -> FollowNet:
@@ -119,7 +116,11 @@ def _check_classes(dataset: Dataset) -> None:
 
 
 def _fit(
-    network: FollowNet, dataset: Dataset, config: FollowTrainingConfig, progress: Progress, snapshot: SnapshotFile
+    network: FollowNet,
+    dataset: Dataset,
+    config: FollowTrainingConfig,
+    progress: Progress,
+    snapshot: SnapshotFile[EpochRecord],
 ) -> LoopResult:
     ranges_m, labels = dataset.train.ranges_m.astype(np.float32), dataset.train.labels
     batches = VariedBatches(ranges_m, labels, config.batch_size, config.augment, config.preprocess, config.seed)

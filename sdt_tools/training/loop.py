@@ -104,7 +104,7 @@ def run_loop(
     seed: int,
     on_epoch: Callable[[EpochRecord], None],
     safety: Safety | None = None,
-    snapshot: SnapshotFile | None = None,
+    snapshot: SnapshotFile[EpochRecord] | None = None,
 ) -> LoopResult:
     """Train ``network`` in place, on one thread; the same inputs give the same weights on the same machine.
 

@@ -5,9 +5,10 @@ Randomness needs no keeping, since every epoch draws from the seed and its own n
 
 import json
 import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
+from typing import Generic, TypeVar
 
 import torch
 from safetensors import SafetensorError, safe_open
@@ -15,17 +16,28 @@ from safetensors.torch import save_file
 from torch import Tensor, nn
 
 from sdt_tools.errors import ConfigError, RunError
-from sdt_tools.training.record import EpochRecord
+from sdt_tools.training.record import Record
+
+_RecordT = TypeVar("_RecordT", bound=Record)
+
+
+def unfinished(out: Path) -> Path:
+    """Where the state of a training is kept that is to become the checkpoint ``out``."""
+    return out.with_name(f"{out.name}.unfinished.safetensors")
 
 
 @dataclass(frozen=True)
-class SnapshotFile:
-    """Where a training keeps its state, and what it is a training of; another's state is not gone on with."""
+class SnapshotFile(Generic[_RecordT]):
+    """Where a training keeps its state, and what it is a training of; another's state is not gone on with.
+
+    ``record`` makes what is noted of an epoch from its values by name.
+    """
 
     path: Path
     settings: Mapping[str, object]
+    record: Callable[..., _RecordT]
 
-    def save(self, network: nn.Module, optimizer: torch.optim.Optimizer, history: Sequence[EpochRecord]) -> None:
+    def save(self, network: nn.Module, optimizer: torch.optim.Optimizer, history: Sequence[_RecordT]) -> None:
         """Replace the state by that after the last epoch of ``history``."""
         tensors = {f"weights.{name}": value.contiguous() for name, value in network.state_dict().items()}
         for place, state in optimizer.state_dict()["state"].items():
@@ -35,7 +47,7 @@ class SnapshotFile:
         save_file(tensors, scratch, about)
         scratch.replace(self.path)
 
-    def restore(self, network: nn.Module, optimizer: torch.optim.Optimizer) -> list[EpochRecord]:
+    def restore(self, network: nn.Module, optimizer: torch.optim.Optimizer) -> list[_RecordT]:
         """Give ``network`` and ``optimizer`` the kept state and return the epochs that led to it; none without a file.
 
         Raises ConfigError where the file is of a training with other settings, RunError where it is damaged.
@@ -54,9 +66,10 @@ class SnapshotFile:
         self._refuse_other(settings)
         network.load_state_dict(_below("weights", tensors))
         groups = optimizer.state_dict()["param_groups"]
-        state = {place: _below(f"optimizer.{place}", tensors) for place in range(len(list(network.parameters())))}
+        places = range(sum(len(group["params"]) for group in groups))
+        state = {place: _below(f"optimizer.{place}", tensors) for place in places}
         optimizer.load_state_dict({"state": state, "param_groups": groups})
-        return [EpochRecord(**row) for row in history]
+        return [self.record(**row) for row in history]
 
     def discard(self) -> None:
         """The training is done."""

@@ -10,7 +10,8 @@ from safetensors.torch import save_file
 
 from sdt_tools.errors import CheckpointError, OutputExistsError, RecordingError
 from sdt_tools.models.card import ModelCard
-from sdt_tools.models.checkpoint import load_checkpoint, reserve, save_checkpoint
+from sdt_tools.models.checkpoint import load_checkpoint, save_checkpoint
+from sdt_tools.models.checkpoint_folder import reserve
 from sdt_tools.models.follow_net import FollowNet, FollowNetConfig, new_follow_net
 from sdt_tools.models.preprocess import PreprocessConfig, resolve_codes
 

@@ -16,11 +16,12 @@ from sdt_tools.models.follow_net import FollowNetConfig
 from sdt_tools.robustness.domains import SafetyLevel, domains
 from sdt_tools.robustness.intervals import domain_differences, worst_margins
 from sdt_tools.training.augment import AugmentConfig
-from sdt_tools.training.follow import FollowTrainingConfig, train_follow, unfinished
+from sdt_tools.training.follow import FollowTrainingConfig, train_follow
 from sdt_tools.training.loop import LoopConfig
 from sdt_tools.training.record import EpochRecord
 from sdt_tools.training.safety import SafetyConfig
 from sdt_tools.training.schedule import LearningRateConfig
+from sdt_tools.training.snapshot import unfinished
 from sdt_tools.training.specification import SpecificationConfig
 
 SMALL = FollowNetConfig(kernels=(9, 5, 3), widths=(8, 16, 16), strides=(4, 4, 2), hidden=24, dropout=0.1)

@@ -1,0 +1,1 @@
+"""Training of the vision network: the last layers on gestures, plainly or against the fast gradient sign."""
