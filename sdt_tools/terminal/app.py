@@ -1,6 +1,7 @@
 """A terminal app that says when its terminal is too small, and works as soon as it is large enough."""
 
 import asyncio
+import os
 import signal
 from collections.abc import Iterable
 from contextlib import suppress
@@ -14,6 +15,12 @@ from textual.widget import Widget
 from textual.widgets import Static
 
 ResultT = TypeVar("ResultT")
+
+
+def follow_the_terminal() -> None:
+    """Forget a size that the environment tells: beside it the terminal's own, which changes, would not be asked for."""
+    for name in ("COLUMNS", "LINES"):
+        os.environ.pop(name, None)
 
 
 class TooSmall(ModalScreen[None]):

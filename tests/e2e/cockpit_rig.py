@@ -12,7 +12,7 @@ from fcntl import ioctl
 from pathlib import Path
 from struct import pack
 
-from labeling_rig import TAKE_OVER, LabelingTerminal
+from labeling_rig import TAKE_OVER, LabelingTerminal, terminal_environment
 
 from sdt_tools.frames import MotionClass, MotionCommand, Odometry, Received
 from sdt_tools.recording.live.decide import STOP
@@ -63,7 +63,7 @@ def start_recording(*arguments: object, before: str = "", columns: int = 80, lin
     as_it_was = termios.tcgetattr(slave)
     program = before + TAKE_OVER + "from sdt_tools.cli.app import main; main()"
     call = [sys.executable, "-c", program, "record", "scene", *map(str, arguments)]
-    environment = {**os.environ, "TERM": "xterm-256color", "COLORTERM": "truecolor"}
+    environment = terminal_environment(columns, lines)
     process = subprocess.Popen(call, stdin=slave, stdout=slave, stderr=slave, env=environment)
     return CockpitTerminal(master, slave, as_it_was, process)
 

@@ -93,14 +93,6 @@ class LabelingTerminal:
         fcntl.ioctl(self.slave, termios.TIOCSWINSZ, struct.pack("HHHH", lines, columns, 0, 0))
         self.process.send_signal(signal.SIGWINCH)
 
-    def insist(self, columns: int, lines: int, words: str) -> None:
-        """Resize until ``words`` are shown: a busy app may be told of a size before it listens."""
-        end_s = time.monotonic() + LONGEST_S
-        while words not in self.look():
-            assert time.monotonic() < end_s, f"'{words}' is not shown"
-            self.resize(columns, lines)
-            time.sleep(0.5)
-
     def end(self) -> int:
         end_s = time.monotonic() + LONGEST_S
         while self.process.poll() is None:
@@ -115,10 +107,10 @@ class LabelingTerminal:
         return termios.tcgetattr(self.slave) == self.before
 
 
-def terminal_environment() -> dict[str, str]:
-    """An environment that lets the terminal itself tell its size, which a test runner may have fixed."""
-    told = {"TERM": "xterm-256color", "COLORTERM": "truecolor"}
-    return {name: value for name, value in os.environ.items() if name not in ("COLUMNS", "LINES")} | told
+def terminal_environment(columns: int = 80, lines: int = 24) -> dict[str, str]:
+    """An environment that tells a size too, as some shells do: what the terminal itself says must go before it."""
+    told = {"TERM": "xterm-256color", "COLORTERM": "truecolor", "COLUMNS": str(columns), "LINES": str(lines)}
+    return {**os.environ, **told}
 
 
 def start_labeling(*arguments: object, columns: int = 80, lines: int = 24) -> LabelingTerminal:
@@ -127,7 +119,7 @@ def start_labeling(*arguments: object, columns: int = 80, lines: int = 24) -> La
     fcntl.ioctl(slave, termios.TIOCSWINSZ, struct.pack("HHHH", lines, columns, 0, 0))
     before = termios.tcgetattr(slave)
     command = [sys.executable, "-c", TAKE_OVER + "from sdt_tools.cli.app import main; main()", "label", "edit"]
-    process = subprocess.Popen(
-        [*command, *map(str, arguments)], stdin=slave, stdout=slave, stderr=slave, env=terminal_environment()
-    )
+    environment = terminal_environment(columns, lines)
+    call = [*command, *map(str, arguments)]
+    process = subprocess.Popen(call, stdin=slave, stdout=slave, stderr=slave, env=environment)
     return LabelingTerminal(master, slave, before, process)

@@ -200,13 +200,13 @@ def test_takes_are_started_paused_discarded_and_kept(tmp_path: Path, cockpit: St
     assert {driver for driver, _ in driven(folder / "take_001.mcap")} == {"expert"}
 
 
-@pytest.mark.slow  # now and then a resize is not heard
 def test_resizing_while_driving_loses_nothing_and_a_small_terminal_still_stops(tmp_path: Path, cockpit: Start) -> None:
     path = tmp_path / "drive.mcap"
     terminal = cockpit("--driver", "keyboard", "--hold-s", "5", "--out", path)
     terminal.wait_for("REC")
     terminal.hold("x", 0.5)
-    terminal.insist(50, 12, "50 × 12 is too small")
+    terminal.resize(50, 12)
+    terminal.wait_for("50 × 12 is too small")
     terminal.press(" ")
     terminal.rest(0.5)
     terminal.resize(160, 50)

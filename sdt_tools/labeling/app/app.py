@@ -10,7 +10,7 @@ from sdt_tools.labeling.app.desk import Beside, Desk, Task
 from sdt_tools.labeling.app.screen import LabelingScreen
 from sdt_tools.labeling.app.state import State
 from sdt_tools.labeling.frame_labels import UNSAID
-from sdt_tools.terminal.app import TerminalApp
+from sdt_tools.terminal.app import TerminalApp, follow_the_terminal
 
 
 class LabelingApp(TerminalApp[None]):
@@ -56,6 +56,7 @@ def label_by_hand(task: Task, beside: Beside | None = None) -> Sitting:
         with Desk(task) as desk:
             app = LabelingApp(desk, beside)
             before = int(np.count_nonzero(desk.opened.mine != UNSAID))
+            follow_the_terminal()
             app.run()
     finally:
         if beside is not None:

@@ -13,7 +13,7 @@ from sdt_tools.recording.live.interrupt import Interrupt, deferred_interrupt
 from sdt_tools.teleop.app.dialogs import HelpDialog, NoteDialog
 from sdt_tools.teleop.app.screen import SHOW_S, CockpitScreen
 from sdt_tools.teleop.cockpit import Cockpit, Recording
-from sdt_tools.terminal.app import TerminalApp
+from sdt_tools.terminal.app import TerminalApp, follow_the_terminal
 from sdt_tools.terminal.hangup import LastingDriver, hangup_watched
 
 ResultT = TypeVar("ResultT")
@@ -70,6 +70,7 @@ def drive(cockpit: Cockpit, record: Callable[[Interrupt], ResultT]) -> ResultT:
     told at once, stops the robot and closes its file; then this returns, or raises what ``record`` raises, RunError
     where the screen has failed.
     """
+    follow_the_terminal()
     with deferred_interrupt() as interrupt:
         recording = Recording(record, interrupt)
         app = CockpitApp(cockpit, recording)
