@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from pathlib import Path
 
 from rich.progress import (
     BarColumn,
@@ -40,6 +41,19 @@ def epoch_bar(epochs: int) -> Iterator[Callable[[int, str], None]]:
     with Progress(*columns, console=console, transient=True, disable=not console.is_terminal) as bar:
         task = bar.add_task("", total=epochs)
         yield lambda epoch, text: bar.update(task, completed=epoch, total=max(epochs, epoch), description=text)
+
+
+@contextmanager
+def says_where_to_go_on(out: Path) -> Iterator[None]:
+    """When the training of ``out`` is interrupted, where its state is kept."""
+    from sdt_tools.training.snapshot import unfinished
+
+    try:
+        yield
+    except KeyboardInterrupt:
+        if unfinished(out).exists():
+            console.print(f"the state is in {unfinished(out)}; the same command goes on from there", soft_wrap=True)
+        raise
 
 
 @contextmanager

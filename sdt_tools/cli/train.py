@@ -68,10 +68,9 @@ def follow(
 
     Interrupted with Ctrl-C, the same command goes on where it was.
     """
-    from sdt_tools.cli.progress import epoch_bar
+    from sdt_tools.cli.progress import epoch_bar, says_where_to_go_on
     from sdt_tools.training.follow import train_follow
     from sdt_tools.training.record import EpochRecord
-    from sdt_tools.training.snapshot import unfinished
 
     asked = {
         "arch": arch,
@@ -93,12 +92,8 @@ def follow(
                 text += f"  bound {record.bound:.2g}  certified {record.certified_share:.0%}"
             bar(record.epoch, text)
 
-        try:
+        with says_where_to_go_on(out):
             summary = train_follow(dataset, settings, out, show)
-        except KeyboardInterrupt:
-            if unfinished(out).exists():
-                console.print(f"the state is in {unfinished(out)}; the same command goes on from there")
-            raise
     if json_output:
         emit(_document(summary))
     else:

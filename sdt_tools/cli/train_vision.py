@@ -59,8 +59,7 @@ def command(
 
     Nothing is downloaded. Interrupted with Ctrl-C, the same command goes on where it was.
     """
-    from sdt_tools.cli.progress import epoch_bar
-    from sdt_tools.training.snapshot import unfinished
+    from sdt_tools.cli.progress import epoch_bar, says_where_to_go_on
     from sdt_tools.training.vision.data import load_vision_data
     from sdt_tools.training.vision.train import train_vision
 
@@ -75,21 +74,16 @@ def command(
     }
     settings = _settings(config, backbone, {name: value for name, value in asked.items() if value is not None})
     data = load_vision_data(dataset, settings.preprocess)
-    with epoch_bar(settings.epochs) as show:
-        try:
-            summary = train_vision(
-                data,
-                settings,
-                out,
-                lambda record, _: show(
-                    record.epoch,
-                    f"ε {record.epsilon}  loss {record.train_loss:.3f}  validation {record.val_accuracy:.1%}",
-                ),
-            )
-        except KeyboardInterrupt:
-            if unfinished(out).exists():
-                console.print(f"the state is in {unfinished(out)}; the same command goes on from there")
-            raise
+    with epoch_bar(settings.epochs) as show, says_where_to_go_on(out):
+        summary = train_vision(
+            data,
+            settings,
+            out,
+            lambda record, _: show(
+                record.epoch,
+                f"ε {record.epsilon}  loss {record.train_loss:.3f}  validation {record.val_accuracy:.1%}",
+            ),
+        )
     if json_output:
         emit(_document(summary))
     else:
