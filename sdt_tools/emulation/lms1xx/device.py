@@ -120,14 +120,18 @@ class EmulatedDevice:
             self.writes += 1
 
     def set_output(self, output: OutputRange) -> None:
-        """Set which rays are sent."""
+        """Set which rays are sent: angles are those of the rays nearest to what is asked for."""
         resolution = self.settings.scan.resolution
-        angles = (output.first_angle, output.last_angle)
-        fits = output.resolution % resolution == 0 and all((angle - FIRST_ANGLE) % resolution == 0 for angle in angles)
-        if output.resolution <= 0 or not FIRST_ANGLE <= angles[0] <= angles[1] <= LAST_ANGLE or not fits:
+        if output.resolution <= 0 or output.resolution % resolution or output.first_angle > output.last_angle:
             raise RefusedError(Refusal.BAD_VALUES)
+        first, last = (
+            min(max(round((angle - FIRST_ANGLE) / resolution) * resolution + FIRST_ANGLE, FIRST_ANGLE), LAST_ANGLE)
+            for angle in (output.first_angle, output.last_angle)
+        )
         with self._lock:
-            self.settings = Settings(self.settings.scan, self.settings.data, output)
+            self.settings = Settings(
+                self.settings.scan, self.settings.data, OutputRange(output.resolution, first, last)
+            )
             self.writes += 1
 
     def start(self, host_ns: int) -> None:

@@ -56,7 +56,7 @@ class ScanStream:
             self.counts.missing += missing
             yield _note(
                 received_ns,
-                f"{missing} {'scan' if missing == 1 else 'scans'} missing before number {scan.scan_counter}",
+                f"{missing} {scans} missing before number {scan.scan_counter}",
             )
         stamp_ns = min(self.clock.host_ns(scan.start_us), received_ns)
         taken = lidar_scan(scan, self._rays, self._after_last(stamp_ns))
