@@ -21,7 +21,7 @@ class EmulatedConfig(Config):
     protocol: Literal["a", "b"] = "a"
     kind: str = "LMS10x_FieldEval"
     version: str = "V1.36-21.10.2010"
-    password: str = Field(default="F4724744", pattern="[0-9A-Fa-f]{8}")
+    password: str = Field(default="F4724744", pattern="^[0-9A-Fa-f]{8}$")
     scan_hz: Literal[25, 50] = 50
     resolution_deg: Literal["0.5", "0.25"] = "0.5"
     boot_s: float = Field(default=0.0, ge=0)
