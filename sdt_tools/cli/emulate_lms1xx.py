@@ -52,22 +52,20 @@ def lms1xx(
     port: Annotated[int, typer.Option(min=0, max=65535, help="Port to listen at; 0 finds a free one.")] = 2111,
     protocol: Annotated[Protocol, typer.Option(help="CoLa-A, which is text, or CoLa-B.")] = Protocol.A,
     seconds: Annotated[float | None, typer.Option(min=0, help="How long to serve; without, until Ctrl-C.")] = None,
-    hz: Annotated[
-        int, typer.Option(help="Scans a second as it was set before: 50 or 25.", rich_help_panel=_DEVICE)
-    ] = 50,
+    hz: Annotated[int, typer.Option(help="Scans a second before it is set: 50 or 25.", rich_help_panel=_DEVICE)] = 50,
     resolution: Annotated[
-        str, typer.Option(help="Degrees between rays as it was set before: 0.5 or 0.25.", rich_help_panel=_DEVICE)
+        str, typer.Option(help="Degrees between rays before it is set: 0.5 or 0.25.", rich_help_panel=_DEVICE)
     ] = "0.5",
     kind: Annotated[str, typer.Option(help="What it says it is.", rich_help_panel=_DEVICE)] = "LMS10x_FieldEval",
     password: Annotated[
         str, typer.Option(help="Hash of the password that changes settings.", rich_help_panel=_DEVICE)
-    ] = "F4724744",
+    ] = "F4724744",  # noqa: S107 - the one that devices are delivered with
     boot_s: Annotated[
         float, typer.Option(min=0, help="From power-on until it measures.", rich_help_panel=_DEVICE)
     ] = 0.0,
     start_s: Annotated[
         float,
-        typer.Option(min=0, help="From new settings until it measures; real ones take 15.", rich_help_panel=_DEVICE),
+        typer.Option(min=0, help="From new settings until it measures; real: 15.", rich_help_panel=_DEVICE),
     ] = 1.0,
     start_us: Annotated[
         int, typer.Option(min=0, help="What its clock shows first; it wraps at 4294967296.", rich_help_panel=_DEVICE)

@@ -9,6 +9,9 @@ from threading import Event, Lock, Thread
 from time import sleep
 from typing import Final, Self
 
+import numpy as np
+from jaxtyping import Float64
+
 from sdt_tools.clock import SECOND_NS, HostClock
 from sdt_tools.emulation.lms1xx.answers import answer
 from sdt_tools.emulation.lms1xx.config import EmulatedConfig
@@ -18,6 +21,7 @@ from sdt_tools.emulation.lms1xx.making import make_scan
 from sdt_tools.emulation.lms1xx.supply import ScanSupply
 from sdt_tools.emulation.lms1xx.wire import Wire
 from sdt_tools.errors import DeviceError
+from sdt_tools.frames import RAYS
 from sdt_tools.robot.lms1xx.framing import Dialect, framed, splitter_for
 from sdt_tools.robot.lms1xx.reading import TelegramError
 from sdt_tools.robot.lms1xx.scan_telegram import write_scan
@@ -55,6 +59,15 @@ class _Client:
     session: Session = field(default_factory=Session)
 
 
+@dataclass(frozen=True, eq=False)
+class _Taken:
+    """A scan: its number since power-on, the host's time when it began, and what was seen."""
+
+    number: int
+    began_ns: int
+    ranges_m: Float64[np.ndarray, "rays"]
+
+
 class EmulatedLms1xx:
     """Listens at once, and serves until it is closed. Raises DeviceError where the port is taken.
 
@@ -78,6 +91,7 @@ class EmulatedLms1xx:
         self.device = EmulatedDevice(self._config, self._clock.now_ns())
         self.device.drift(self._clock.now_ns(), self._faults.drift_ppm)
         self.counts = EmulatedCounts()
+        self._newest = _Taken(0, self._clock.now_ns(), np.zeros(RAYS))
         self.silent = False
         """While set, no scan is sent; commands are answered."""
         self._unplugged = Event()
@@ -205,7 +219,7 @@ class EmulatedLms1xx:
             return
         host_ns = self._clock.now_ns()
         if telegram.name == SCAN_DATA and telegram.kind == "sRN":
-            reply = self._scan_body("sRA", host_ns, self.device.scans)
+            reply = self._scan_body("sRA", self._newest)
         else:
             reply = answer(self.device, client.session, telegram, host_ns)
         client.wire.put(framed(self.device.dialect, reply), is_scan=False)
@@ -238,13 +252,14 @@ class EmulatedLms1xx:
         self.counts.scans += 1
         if self._on_scan is not None:
             self._on_scan(device.scans, began_ns)
+        self._newest = _Taken(device.scans, began_ns, self._supply.ranges_at(began_ns))
         if self.silent or device.scans % device.settings.data.interval:
             return
         with self._lock:
             streaming = [client for client in self._clients if client.session.streams]
-        data = framed(device.dialect, self._scan_body("sSN", began_ns, device.scans))
         if not streaming:
             return
+        data = framed(device.dialect, self._scan_body("sSN", self._newest))
         if self._random.random() < faults.drop:
             self.counts.dropped += 1
             return
@@ -258,20 +273,19 @@ class EmulatedLms1xx:
         for client in streaming:
             client.wire.put(data, is_scan=True)
 
-    def _scan_body(self, kind: str, began_ns: int, number: int) -> bytes:
-        """The telegram of a scan that began at ``began_ns``, handed over now."""
+    def _scan_body(self, kind: str, taken: _Taken) -> bytes:
+        """The telegram of a scan, handed over now."""
         device = self.device
         device.telegrams += 1
-        ranges_m = self._supply.ranges_at(began_ns)
         settings = device.settings
-        times_us = round(device.time.us_at(began_ns)), round(device.time.us_at(self._clock.now_ns()))
+        times_us = round(device.time.us_at(taken.began_ns)), round(device.time.us_at(self._clock.now_ns()))
         scan = make_scan(
-            ranges_m,
+            taken.ranges_m,
             settings.scan,
             settings.data,
             settings.output,
             times_us,
-            (device.telegrams, number),
+            (device.telegrams, taken.number),
             self._config.scale,
             self._config.device_name,
         )

@@ -54,10 +54,8 @@ class ScanStream:
         missing = self._counter.see(scan.scan_counter, sent_us - (scan.transmission_us - scan.start_us) % _TURN_US)
         if missing:
             self.counts.missing += missing
-            yield _note(
-                received_ns,
-                f"{missing} {scans} missing before number {scan.scan_counter}",
-            )
+            scans = "scan" if missing == 1 else "scans"
+            yield _note(received_ns, f"{missing} {scans} missing before number {scan.scan_counter}")
         stamp_ns = min(self.clock.host_ns(scan.start_us), received_ns)
         taken = lidar_scan(scan, self._rays, self._after_last(stamp_ns))
         if not self.clock.settled:
