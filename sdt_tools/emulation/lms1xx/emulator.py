@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from random import Random
 from threading import Event, Lock, Thread
 from time import sleep
-from typing import Final, Self
+from typing import Final
 
 import numpy as np
 from jaxtyping import Float64
@@ -162,7 +162,7 @@ class EmulatedLms1xx:
         for thread in self._threads:
             thread.join()
 
-    def __enter__(self) -> Self:
+    def __enter__(self) -> "EmulatedLms1xx":
         return self
 
     def __exit__(self, *error: object) -> None:
@@ -240,7 +240,7 @@ class EmulatedLms1xx:
             if began_us is None or powered != self.device.power_ons:
                 began_us, powered = self.device.time.us_at(now_ns), self.device.power_ons
             began_us += _US * _CENTIHERTZ / self.device.settings.scan.frequency
-            began_ns = self.device.time.host_at(round(began_us))
+            began_ns = self.device.time.host_at(float(round(began_us)))
             left_s = (self.device.time.host_at(began_us + LATENCY_US) - self._clock.now_ns()) / SECOND_NS
             if left_s > 0 and self._closing.wait(left_s):
                 return
