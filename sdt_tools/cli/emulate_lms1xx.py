@@ -139,9 +139,8 @@ def lms1xx(
     supply = _supply(scene, recording, seed)
     with EmulatedLms1xx(supply, config, wrong) as emulator:
         source = recording or f"scenario {scene or 'plain'}"
-        console.print(
-            f"LMS1xx with {source} at {host}:{emulator.port}, {emulator.device.dialect.label}; Ctrl-C ends it"
-        )
+        served = f"{source} at {host}:{emulator.port}, {emulator.device.dialect.label}"
+        console.print(f"LMS1xx with {served}; Ctrl-C ends it", soft_wrap=True)
         _serve(emulator, None if trouble is None else Trouble(trouble.value), every_s, lasting_s, seconds)
         counts = asdict(emulator.counts)
     if json_output:

@@ -22,7 +22,8 @@ SDT = [sys.executable, "-c", "from sdt_tools.cli.app import main; main()", "robo
 
 def test_a_recording_is_served_until_ctrl_c_and_what_was_done_is_told() -> None:
     command = [*SDT, "--port", "0", "--recording", str(SAMPLE), "--protocol", "b", "--drop", "0.1", "--json"]
-    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as emulator:
+    emulator = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    try:
         assert emulator.stderr is not None
         said = re.search(r"127\.0\.0\.1:(\d+), CoLa-B; Ctrl-C ends it", emulator.stderr.readline())
         assert said is not None
@@ -32,6 +33,9 @@ def test_a_recording_is_served_until_ctrl_c_and_what_was_done_is_told() -> None:
         lidar.close()
         emulator.send_signal(signal.SIGINT)
         out, _ = emulator.communicate(timeout=10)
+    finally:
+        emulator.kill()
+        emulator.communicate()
     assert scans[0].ranges_m.shape == (RAYS,)
     assert emulator.returncode == 0
     counts = json.loads(out)
