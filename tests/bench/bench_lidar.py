@@ -18,13 +18,13 @@ from pytest_benchmark.fixture import BenchmarkFixture
 
 sys.path.append(str(Path(__file__).parents[1] / "unit" / "robot"))
 
-from lidar_rig import Slope
+from lidar_rig import Slope, rig
 
 from sdt_tools.clock import HostClock
 from sdt_tools.emulation.lms1xx.config import EmulatedConfig
 from sdt_tools.emulation.lms1xx.emulator import EmulatedLms1xx
 from sdt_tools.emulation.lms1xx.faults import Faults
-from sdt_tools.frames import LidarScan
+from sdt_tools.frames import LidarScan, LogEntry, Received
 from sdt_tools.robot.lms1xx.config import Lms1xxConfig
 from sdt_tools.robot.lms1xx.driver import Lms1xx
 from sdt_tools.robot.lms1xx.framing import Dialect, framed, splitter_for
@@ -90,6 +90,51 @@ def test_a_soak(benchmark: BenchmarkFixture, protocol: str) -> None:
         p99_stamp_ms=float(np.percentile(nearest, 99)) / 1e6,
         share_of_a_core=core,
     )
+
+
+TROUBLES = 10
+
+
+@pytest.mark.parametrize("trouble", ["silence", "cable", "power"])
+def test_a_trouble_is_reported_and_got_over(benchmark: BenchmarkFixture, trouble: str) -> None:
+    """How long after the last scan the log says so, and how long after the device is back scans come again."""
+    reported_ms: list[float] = []
+    back_ms: list[float] = []
+
+    def suffer() -> None:
+        with rig(EmulatedConfig(port=0, start_s=0.0)) as robot:
+            for _ in range(TROUBLES):
+                robot.more_scans(5)
+                last_ns = robot.received[-1].received_ns
+                robot.received.clear()
+                start, end = TROUBLE[trouble]
+                start(robot.emulator)
+                robot.until(lambda: any("no scan" in line or "lost" in line for line in robot.log))
+                scans = [one.received_ns for one in robot.received if isinstance(one.message, LidarScan)]
+                words = next(one for one in robot.received if isinstance(one.message, LogEntry) and trouble_in(one))
+                reported_ms.append((words.received_ns - max([last_ns, *scans])) / 1e6)
+                robot.until(lambda: robot.lidar.age_s > 1.0)
+                robot.received.clear()
+                back_ns = robot.clock.now_ns()
+                end(robot.emulator)
+                robot.more_scans(1)
+                first = next(one for one in robot.received if isinstance(one.message, LidarScan))
+                back_ms.append((first.received_ns - back_ns) / 1e6)
+
+    benchmark.pedantic(suffer, rounds=1)
+    benchmark.extra_info.update(worst_report_ms=max(reported_ms), worst_back_ms=max(back_ms))
+
+
+def trouble_in(received: Received) -> bool:
+    assert isinstance(received.message, LogEntry)
+    return "no scan" in received.message.text or "lost" in received.message.text
+
+
+TROUBLE = {
+    "silence": (lambda device: setattr(device, "silent", True), lambda device: setattr(device, "silent", False)),
+    "cable": (lambda device: device.unplug(), lambda device: device.unplug(False)),
+    "power": (lambda device: device.switch_off(), lambda device: device.switch_on()),
+}
 
 
 @pytest.mark.parametrize("dialect", Dialect, ids=lambda dialect: dialect.label)

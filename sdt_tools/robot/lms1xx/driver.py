@@ -87,9 +87,10 @@ class Lms1xx:
         self._last_scan_ns: int | None = None
         self._last_scan_s = monotonic()
         self._given_up_s = GIVEN_UP_S
+        self._mute: set[str] = set()
         self._link, self._identity = open_link(config)
         try:
-            start_stream(self._link, config, self._closing, say or self._say)
+            start_stream(self._link, config, self._closing, say or self._say, self._mute)
         except BaseException:
             self._link.close()
             raise
@@ -231,7 +232,7 @@ class Lms1xx:
             else:
                 self._link, self._identity = link, identity
                 try:
-                    start_stream(link, self._config, self._closing, self._say)
+                    start_stream(link, self._config, self._closing, self._say, self._mute)
                 except SdtError as error:
                     link.close()
                     self._problem = str(error).removeprefix(f"{self._config.place}: ")

@@ -38,6 +38,7 @@ Say = Callable[[str], None]
 """Takes a line about what is being done."""
 ValueT = TypeVar("ValueT")
 _LMS1XX: Final = re.compile(r"LMS1[0-9x]{2}(?![0-9x])", re.IGNORECASE)
+UNNAMED: Final = Identity("a device that does not name itself", "")
 _POLL_S: Final = 0.1
 _AGAIN_S: Final = 10.0
 """A device that is not ready after so long, though told to measure, is logged out of and told again."""
@@ -81,12 +82,14 @@ def open_link(
     raise DeviceError(f"{config.place}: {_stranger(config.dialects, heard)}")
 
 
-def start_stream(link: Link, config: Lms1xxConfig, closing: Event, say: Say) -> None:
+def start_stream(link: Link, config: Lms1xxConfig, closing: Event, say: Say, mute: set[str]) -> None:
     """Have the device measure as ``config`` says, and send its scans.
+
+    ``mute`` holds settings that this device does not tell, and learns more of them: nobody waits for them twice.
 
     Raises DeviceError where it refuses, where its password is another, or where it does not get ready in time.
     """
-    changes = needed_changes(link, config)
+    changes = needed_changes(link, config, mute)
     state = _state(link)
     if changes or state != MEASURING:
         if state != MEASURING:
@@ -100,12 +103,12 @@ def start_stream(link: Link, config: Lms1xxConfig, closing: Event, say: Say) -> 
     link.ask("sEN LMDscandata", fields)
 
 
-def needed_changes(link: Link, config: Lms1xxConfig) -> Changes:
+def needed_changes(link: Link, config: Lms1xxConfig, mute: set[str]) -> Changes:
     """What must be written. A setting that the device does not tell is written, if it matters."""
     wanted = config.scan_settings
-    scan = _read(link, "LMPscancfg", read_scan_settings)
-    data = _read(link, "LMDscandatacfg", read_data_settings)
-    output = _read(link, "LMPoutputRange", read_output_range)
+    scan = _read(link, "LMPscancfg", read_scan_settings, mute)
+    data = _read(link, "LMDscandatacfg", read_data_settings, mute)
+    output = _read(link, "LMPoutputRange", read_output_range, mute)
     wanted_output = OutputRange(wanted.resolution)
     return Changes(
         None if scan is not None and scan.same_rays(wanted) else wanted,
@@ -121,6 +124,8 @@ def _all_scans(data: DataSettings | None) -> DataSettings:
 
 def _lms1xx(link: Link, wait_s: float) -> Identity:
     identity = _identity(link, wait_s)
+    if identity == UNNAMED:
+        return identity
     if _LMS1XX.match(identity.kind) is None:
         raise DeviceError(
             f"{link.place} is no LMS1xx: it says it is '{identity}'; give the LiDAR's address, or use another driver"
@@ -129,11 +134,16 @@ def _lms1xx(link: Link, wait_s: float) -> Identity:
 
 
 def _identity(link: Link, wait_s: float) -> Identity:
-    try:
-        answer = link.ask("sRN DeviceIdent", wait_s=wait_s)
-    except RefusedError:
-        answer = link.ask("sRI 0", wait_s=wait_s)  # as old firmware calls it
-    return _parsed(link, answer, read_identity)
+    """What the device says it is; UNNAMED where it does not say, but tells its state as an LMS1xx does."""
+    for head in ("sRN DeviceIdent", "sRI 0"):  # the second as old firmware calls it
+        try:
+            return _parsed(link, link.ask(head, wait_s=wait_s), read_identity)
+        except RefusedError:
+            continue
+        except NoAnswerError:
+            break
+    link.ask("sRN STlms", wait_s=wait_s)
+    return UNNAMED
 
 
 def _stranger(dialects: tuple[Dialect, ...], heard: bytes) -> str:
@@ -150,11 +160,14 @@ def _stranger(dialects: tuple[Dialect, ...], heard: bytes) -> str:
     )
 
 
-def _read(link: Link, name: str, read: Callable[[FieldReader], ValueT]) -> ValueT | None:
+def _read(link: Link, name: str, read: Callable[[FieldReader], ValueT], mute: set[str]) -> ValueT | None:
     """What is set; None where the device refuses to tell, is silent about it, or tells it in another way."""
+    if name in mute:
+        return None
     try:
         return read(link.ask(f"sRN {name}").fields)
     except (RefusedError, NoAnswerError, TelegramError):
+        mute.add(name)
         return None
 
 

@@ -4,7 +4,7 @@ import socket
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from http.server import BaseHTTPRequestHandler, HTTPServer
-from threading import Thread
+from threading import Event, Thread
 
 import pytest
 from lidar_rig import Slope
@@ -15,8 +15,8 @@ from sdt_tools.emulation.lms1xx.emulator import EmulatedLms1xx
 from sdt_tools.errors import ConfigError, DeviceError
 from sdt_tools.robot.lms1xx.config import Lms1xxConfig
 from sdt_tools.robot.lms1xx.driver import Lms1xx
-from sdt_tools.robot.lms1xx.framing import Dialect
-from sdt_tools.robot.lms1xx.handshake import open_link
+from sdt_tools.robot.lms1xx.framing import Dialect, framed, splitter_for
+from sdt_tools.robot.lms1xx.handshake import UNNAMED, open_link, start_stream
 from sdt_tools.robot.lms1xx.link import Link, RefusedError
 from sdt_tools.robot.lms1xx.refusals import refusal_words
 
@@ -119,6 +119,39 @@ def test_a_device_that_measures_but_sends_nothing(monkeypatch: pytest.MonkeyPatc
     with EmulatedLms1xx(Slope(), EmulatedConfig(port=0)) as emulator:
         emulator.silent = True
         assert "no scan for 0.3 s" in refused(emulator.port)
+
+
+def test_a_device_that_tells_neither_its_name_nor_its_settings_is_set_and_streams() -> None:
+    """As the small emulators that people write for themselves: what is not in this table is not answered."""
+    answers = {
+        b"sRN STlms": b"sRA STlms 7 0 8 00:00:00 8 01.01.70 0 0 0",
+        b"sMN SetAccessMode": b"sAN SetAccessMode 1",
+        b"sMN mLMPsetscancfg": b"sAN mLMPsetscancfg 0 1388 1 1388 FFF92230 225510",
+        b"sWN LMDscandatacfg": b"sWA LMDscandatacfg",
+        b"sMN LMCstartmeas": b"sAN LMCstartmeas 0",
+        b"sMN Run": b"sAN Run 1",
+        b"sEN LMDscandata": b"sEA LMDscandata 1",
+    }
+    asked: list[bytes] = []
+
+    def serve(client: socket.socket) -> None:
+        splitter = splitter_for(Dialect.A)
+        while data := client.recv(4096):
+            for body in splitter.feed(data):
+                asked.append(b" ".join(body.split()[:2]))
+                if asked[-1] in answers:
+                    client.sendall(framed(Dialect.A, answers[asked[-1]]))
+
+    with server(serve) as port:
+        config = Lms1xxConfig(host="127.0.0.1", port=port)
+        link, identity = open_link(config, wait_s=0.05)
+        mute: set[str] = {"LMPscancfg", "LMDscandatacfg"}
+        start_stream(link, config, Event(), str, mute)
+        link.close()
+    assert identity == UNNAMED
+    assert mute == {"LMPscancfg", "LMDscandatacfg", "LMPoutputRange"}
+    order = [b"SetAccessMode", b"mLMPsetscancfg", b"LMDscandatacfg", b"LMCstartmeas", b"STlms", b"Run", b"LMDscandata"]
+    assert [name.split()[1] for name in asked[-7:]] == order
 
 
 def test_a_refused_command_is_explained() -> None:
