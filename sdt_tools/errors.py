@@ -8,6 +8,7 @@ SdtError                     exit 1: something failed
 │   ├── LabelError           a label journal
 │   ├── DatasetError         a data set that cannot be built or used
 │   ├── CheckpointError      a model folder
+│   ├── DeviceError          a sensor, a camera or a base that cannot be reached, or is another
 │   └── OutputExistsError    an output that would be written over
 └── RunError                 a unit of work failed; what was finished before is kept
 
@@ -51,6 +52,10 @@ class DatasetError(UsageError):
 
 class CheckpointError(UsageError):
     """A model folder is missing, incomplete, or of another architecture."""
+
+
+class DeviceError(UsageError):
+    """A device of the robot cannot be opened or reached, or does not answer as it should."""
 
 
 class OutputExistsError(UsageError):

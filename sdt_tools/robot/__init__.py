@@ -1,0 +1,1 @@
+"""The real robot: its sensors and its base."""
