@@ -27,6 +27,7 @@ class Emulated:
     watchdog_stops: int
     pose: Pose2D
     velocity: Twist
+    motors_on: bool
 
     def document(self) -> dict[str, object]:
         """For machines."""
@@ -34,6 +35,7 @@ class Emulated:
         return {
             "packets_received": self.packets_received,
             "watchdog_stops": self.watchdog_stops,
+            "motors_on": self.motors_on,
             "pose": {"x_m": pose.x_m, "y_m": pose.y_m, "yaw_rad": pose.yaw_rad},
             "velocity": {"linear_mps": velocity.linear_mps, "angular_radps": velocity.angular_radps},
         }
@@ -69,7 +71,8 @@ class EmulatedP3at:
     def report(self) -> Emulated:
         """How it fares now."""
         firmware = self._firmware
-        return Emulated(firmware.received, firmware.watchdog_stops, firmware.body.pose, firmware.velocity)
+        pose, motors = firmware.body.pose, firmware.motors
+        return Emulated(firmware.received, firmware.watchdog_stops, pose, motors.velocity, motors.on)
 
     def close(self) -> None:
         """End. May be called twice."""

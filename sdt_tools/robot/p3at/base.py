@@ -89,7 +89,9 @@ class P3atBase:
         Raises RunError where the thread has failed.
         """
         if self._failure is not None:
-            raise RunError(f"the base's driver failed ({type(self._failure).__name__}: {self._failure}); it was stopped")
+            raise RunError(
+                f"the base's driver failed ({type(self._failure).__name__}: {self._failure}); it was stopped"
+            )
         received = self._arrivals.take(until_ns)
         dropped = self._arrivals.dropped - self._dropped_told
         if dropped:

@@ -57,7 +57,9 @@ def test_both_bits_of_the_emergency_button_count(flags: int) -> None:
     assert not status.motors_on
 
 
-@pytest.mark.parametrize("body", [b"", b"\x32", by_hand()[:-1], by_hand(kind=0x20), by_hand(sonars=b"\x02\x00\x01\x02")])
+@pytest.mark.parametrize(
+    "body", [b"", b"\x32", by_hand()[:-1], by_hand(kind=0x20), by_hand(sonars=b"\x02\x00\x01\x02")]
+)
 def test_what_is_cut_off_or_of_another_type_is_no_status(body: bytes) -> None:
     assert decode_status(body) is None
 
