@@ -11,7 +11,8 @@ from sdt_tools.robot.p3at.config import P3atConfig
 address, ends = sys.argv[1:]
 base = P3atBase(P3atConfig(address=address, command_lasts_s=60.0))
 base.command(Twist(0.5, 0.0))
-print("drives", flush=True)
+sys.stdout.write("drives\n")
+sys.stdout.flush()
 match ends:
     case "kill":
         time.sleep(60)

@@ -96,8 +96,9 @@ class P3atBase:
         dropped = self._arrivals.dropped - self._dropped_told
         if dropped:
             self._dropped_told += dropped
+            now_ns = min(until_ns, self._clock.now_ns())
             text = f"{dropped} messages of the base were dropped: nobody has read them"
-            received.append(Received(until_ns, LogEntry(until_ns, LogLevel.WARNING, text, NAME)))
+            received.append(Received(now_ns, LogEntry(now_ns, LogLevel.WARNING, text, NAME)))
         return received
 
     def close(self) -> None:
@@ -141,12 +142,13 @@ class P3atBase:
         refresh_ns = round(self._config.refresh_s * SECOND_NS)
         due_ns = monotonic_ns()
         try:
+            wire, woken = self.session.link.fileno(), self._woken.fileno()
             while not self._closing.is_set():
                 left_s = max(0, due_ns - monotonic_ns()) / SECOND_NS
-                ready = select.select([self.session.link, self._woken], [], [], left_s)[0]
-                if self._woken in ready:
+                ready = select.select([wire, woken], [], [], left_s)[0]
+                if woken in ready:
                     self._woken.recv(4096)
-                if self.session.link in ready:
+                if wire in ready:
                     self._hear(self.session.link.read())
                 if self._emergency_news.is_set():
                     self._emergency_news.clear()
@@ -155,7 +157,7 @@ class P3atBase:
                 self._note_silence(silent_s)
                 if silent_s > _GIVES_UP_FACTOR * self._config.silent_s:
                     return f"silent for {silent_s:.1f} s"
-                if self._woken in ready or monotonic_ns() >= due_ns:
+                if woken in ready or monotonic_ns() >= due_ns:
                     self._send()
                     due_ns = monotonic_ns() + refresh_ns
         except LinkLostError as error:

@@ -17,8 +17,8 @@ class P3atConfig(Config):
 
     ``address``: a serial port (``/dev/ttyUSB0``) or ``socket://HOST:PORT``. ``refresh_s``: how often the command is
     sent again; well below the base's own watchdog. ``command_lasts_s``: a motion that nobody has commanded again for
-    so long is not sent any more, the last resort against a program that hangs. ``silent_s``: the base speaks ten times a
-    second, and counts as lost when it has not for so long. Accelerations are set in the base for the session alone.
+    so long is not sent any more, the last resort against a program that hangs. ``silent_s``: the base speaks ten times
+    a second, and when it has not for so long it is told to stand. Accelerations are set for the session alone.
 
     ``turn_steps``, ``position_scale`` and ``speed_scale`` turn the base's units into turns, mm and mm/s; firmware since
     ARCOS needs no other values than these (ARIA's parameters for the p3at-sh).

@@ -15,7 +15,7 @@ _JUMP_M: Final = 1.0
 class Odometer:
     """Follows the base from where it is first seen, which is the origin.
 
-    The base's counters begin anew when it is switched on or its session opened; ``reconnected`` says that they may have.
+    The base's counters begin anew when it is switched on or a session opened; ``reconnected`` says that they may have.
     """
 
     def __init__(self, config: P3atConfig) -> None:
