@@ -33,6 +33,7 @@ VERBS = (
     "replay",
     "errors",
     "view",
+    "robot",
     "paper",
 )
 """In the order of the flow. Each is a module here (``import_`` for ``import``) with a ``command``, or an ``app``."""

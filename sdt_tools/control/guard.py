@@ -1,6 +1,7 @@
 """A guard against what stands ahead, beneath whatever drives."""
 
 import math
+import threading
 from enum import IntEnum
 from typing import Final
 
@@ -55,9 +56,10 @@ class GuardConfig(Config):
 
 
 def clearance_m(scan: LidarScan, side_m: float, preprocess: PreprocessConfig) -> float:
-    """Free way ahead of the robot's front, as wide as the robot and ``side_m`` more on each side; inf where all is free.
+    """Free way ahead of the robot's front, as wide as the robot and ``side_m`` more on each side.
 
-    Nearer than the front it is negative. Readings that are codes are no distances, and are passed over.
+    It is inf where nothing is met, and negative nearer than the front. Readings that are codes are no distances, and are
+    passed over.
     """
     valid = ~invalid_rays(scan.ranges_m[np.newaxis], preprocess)[0]
     angles_rad = np.linspace(scan.start_angle_rad, scan.end_angle_rad, len(scan.ranges_m))[valid]
@@ -80,6 +82,8 @@ class ObstacleGuard:
 
     It has to see the scans. It acts on each of them, also between two commands; without a scan, or without enough valid
     front rays, nothing drives forward. It knows nothing of what is beside and behind. ``entries`` says when it acts.
+    Commands and scans may come from different threads. A watchdog belongs above it, not below: what the guard sends by
+    itself is nobody's decision.
     """
 
     def __init__(
@@ -100,6 +104,7 @@ class ObstacleGuard:
         self._acts = _Acts.FREE
         self._now_ns = 0
         self._entries: list[LogEntry] = []
+        self._lock = threading.RLock()
 
     @property
     def is_on(self) -> bool:
@@ -114,30 +119,37 @@ class ObstacleGuard:
 
     def command(self, twist: Twist) -> None:
         """Drive with ``twist``, as far as that is safe."""
-        self._wanted = twist
-        self._pass_on(again=True)
+        with self._lock:
+            self._wanted = twist
+            self._pass_on(again=True)
 
     def observe(self, received: Received) -> None:
         """Look at a scan."""
         self._now_ns = max(self._now_ns, received.received_ns)
         if not isinstance(received.message, LidarScan):
             return
-        scan, config = received.message, self._config
-        share = float(invalid_front_share(scan.ranges_m[np.newaxis], self._preprocess)[0])
-        if share > config.invalid_share:
-            self._limit_mps, self._reason = 0.0, f"{share:.0%} of the front rays see nothing"
-        else:
-            ahead_m = clearance_m(scan, config.side_m, self._preprocess)
-            self._limit_mps, self._reason = config.speed_mps(ahead_m), f"something {ahead_m:.2f} m ahead"
-        self._pass_on(again=False)
+        limit_mps, reason = self._limit(received.message)
+        with self._lock:
+            self._limit_mps, self._reason = limit_mps, reason
+            self._pass_on(again=False)
 
     def entries(self) -> list[LogEntry]:
         """What it has to say since the last call."""
-        said, self._entries = self._entries, []
+        with self._lock:
+            said, self._entries = self._entries, []
         return said
 
     def close(self) -> None:
         """The session has ended."""
+
+    def _limit(self, scan: LidarScan) -> tuple[float, str]:
+        """The most that ``scan`` allows forward, and what it is that limits."""
+        config = self._config
+        share = float(invalid_front_share(scan.ranges_m[np.newaxis], self._preprocess)[0])
+        if share > config.invalid_share:
+            return 0.0, f"{share:.0%} of the front rays see nothing"
+        ahead_m = clearance_m(scan, config.side_m, self._preprocess)
+        return config.speed_mps(ahead_m), f"something {ahead_m:.2f} m ahead"
 
     def _pass_on(self, again: bool) -> None:
         wanted = self._wanted

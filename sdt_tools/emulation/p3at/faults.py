@@ -43,8 +43,8 @@ _PATTERN: Final = re.compile(
 
 FAULT_HELP: Final = (
     "What goes wrong, as KIND[=VALUE][@FROM[-TO]] in seconds from the start; repeat for more. On the wire: split=BYTES "
-    "(pieces of so many), merge=PACKETS, delay=SECONDS, drop=SHARE, corrupt=SHARE (bad checksums), garbage=SHARE, power "
-    "(switched off). In the base: stall, front-bumper, rear-bumper, button (emergency stop), battery=VOLTS."
+    "(pieces of so many), merge=PACKETS, delay=SECONDS, drop=SHARE, corrupt=SHARE (bad checksums), garbage=SHARE, "
+    "power (switched off). In the base: stall, front-bumper, rear-bumper, button (emergency stop), battery=VOLTS."
 )
 
 

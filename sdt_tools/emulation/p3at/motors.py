@@ -12,10 +12,9 @@ HARD_STOP_RADPS2: Final = 20.0
 
 
 class Motors:
-    """Speeds that change no faster than the accelerations, of which firmware keeps one for speeding up and one for
-    slowing down.
+    """Speeds that change no faster than the accelerations.
 
-    The factory accelerations are 0.3 m/s² and 100°/s².
+    Firmware keeps one for speeding up and one for slowing down; from the factory 0.3 m/s² and 100°/s².
     """
 
     def __init__(self) -> None:

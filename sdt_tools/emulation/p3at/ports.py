@@ -97,7 +97,7 @@ class TcpPort:
             self._server = socket.create_server((self._host, self._port), backlog=4)
         except OSError as error:
             raise UsageError(
-                f"{self._host}:{self._port} cannot be listened on ({error.strerror or error}); choose another --port"
+                f"{self._host}:{self._port} cannot be listened on ({_reason(error)}); choose another --host or --port"
             ) from None
         self._server.setblocking(False)
         self._port = self._server.getsockname()[1]
@@ -122,6 +122,10 @@ class TcpPort:
         if self._client is not None:
             self._client.close()
             self._client = None
+
+
+def _reason(error: OSError) -> str:
+    return os.strerror(error.errno) if error.errno and error.errno > 0 else str(error)
 
 
 class PtyPort:

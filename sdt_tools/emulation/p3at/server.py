@@ -2,6 +2,7 @@
 
 import select
 import threading
+from collections.abc import Callable
 from dataclasses import dataclass
 from time import monotonic_ns
 from typing import Final
@@ -16,6 +17,7 @@ from sdt_tools.frames import Pose2D, Twist
 from sdt_tools.robot.p3at.settings import BaseSettings
 
 _LOOK_S: Final = 0.005
+_WAIT_S: Final = 0.05
 _END_S: Final = 2.0
 
 
@@ -73,6 +75,12 @@ class EmulatedP3at:
         firmware = self._firmware
         pose, motors = firmware.body.pose, firmware.motors
         return Emulated(firmware.received, firmware.watchdog_stops, pose, motors.velocity, motors.on)
+
+    def wait(self, seconds: float | None, ended: Callable[[], bool]) -> None:
+        """Until ``seconds`` have passed, where there are any, or ``ended``."""
+        until_ns = None if seconds is None else self._start_ns + round(seconds * SECOND_NS)
+        while not ended() and (until_ns is None or monotonic_ns() < until_ns):
+            self._ended.wait(_WAIT_S)
 
     def close(self) -> None:
         """End. May be called twice."""

@@ -90,7 +90,7 @@ class Camera:
         """Hand out pictures until there are no more."""
         plays = opened.kind is SourceKind.FILE
         period_ns = round(SECOND_NS / (opened.rate_hz or self._config.rate_hz))
-        pacer = Pacer(period_ns, self._clock, lambda wait_s: bool(self._closing.wait(wait_s)) and None)
+        pacer = Pacer(period_ns, self._clock, self._pause)
         while not self._closing.is_set():
             if plays:
                 pacer.wait()
@@ -104,6 +104,9 @@ class Camera:
             self._last_ns = picture.received_ns
             self._newest = picture
             self._pictures.put(picture)
+
+    def _pause(self, wait_s: float) -> None:
+        self._closing.wait(wait_s)
 
     def _open_again(self) -> Opened | None:
         """The camera when it is back; None where it is not wanted any more."""
