@@ -58,8 +58,7 @@ class GuardConfig(Config):
 def clearance_m(scan: LidarScan, side_m: float, preprocess: PreprocessConfig) -> float:
     """Free way ahead of the robot's front, as wide as the robot and ``side_m`` more on each side.
 
-    It is inf where nothing is met, and negative nearer than the front. Readings that are codes are no distances, and are
-    passed over.
+    It is inf where nothing is met, and negative nearer than the front. Codes are no distances, and are passed over.
     """
     valid = ~invalid_rays(scan.ranges_m[np.newaxis], preprocess)[0]
     angles_rad = np.linspace(scan.start_angle_rad, scan.end_angle_rad, len(scan.ranges_m))[valid]
