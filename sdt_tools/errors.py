@@ -8,9 +8,9 @@ SdtError                     exit 1: something failed
 │   ├── LabelError           a label journal
 │   ├── DatasetError         a data set that cannot be built or used
 │   ├── CheckpointError      a model folder
-│   ├── DeviceError          a sensor, a camera or a base that cannot be reached, or is another
 │   └── OutputExistsError    an output that would be written over
-└── RunError                 a unit of work failed; what was finished before is kept
+├── RunError                 a unit of work failed; what was finished before is kept
+└── DeviceError              a device of the robot cannot be reached, refuses, or is another one
 
 A message says what happened, where, and what the user can do.
 """
@@ -54,10 +54,6 @@ class CheckpointError(UsageError):
     """A model folder is missing, incomplete, or of another architecture."""
 
 
-class DeviceError(UsageError):
-    """A device of the robot cannot be opened or reached, or does not answer as it should."""
-
-
 class OutputExistsError(UsageError):
     """The output exists; nothing is ever written over unasked. ``option`` names it in the call, if one does."""
 
@@ -68,3 +64,7 @@ class OutputExistsError(UsageError):
 
 class RunError(SdtError):
     """A unit of work failed."""
+
+
+class DeviceError(SdtError):
+    """A device of the robot cannot be reached, refuses, or is another one."""

@@ -1,13 +1,20 @@
-"""``sdt robot``: the robot's devices, and programs that play them."""
+"""``sdt robot``: the robot's devices, and emulated ones in their place."""
 
 import typer
 
-from sdt_tools.cli import robot_emulate_p3at
+from sdt_tools.cli import emulate_p3at
 
-emulate = typer.Typer(
-    help="Play a device of the robot, with its faults, for drivers to be tried on.", no_args_is_help=True
-)
-emulate.command("p3at")(robot_emulate_p3at.command)
-
-app = typer.Typer(help="The robot's devices: play them.", no_args_is_help=True)
+app = typer.Typer(no_args_is_help=True, help="The robot's devices, and emulated ones in their place.")
+emulate = typer.Typer(no_args_is_help=True, help="Be one of the robot's devices, with faults on demand.")
 app.add_typer(emulate, name="emulate")
+emulate.command("p3at")(emulate_p3at.p3at)
+
+
+@app.callback()
+def robot() -> None:
+    """The robot's devices, and emulated ones in their place."""
+
+
+@emulate.callback()
+def emulated() -> None:
+    """Be one of the robot's devices, with faults on demand."""

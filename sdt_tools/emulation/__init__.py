@@ -1,1 +1,1 @@
-"""Devices played by a program, so that drivers can be tried without them, and with their faults."""
+"""Devices that are not there: what the robot's drivers talk to where no robot is at hand."""

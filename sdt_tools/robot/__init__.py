@@ -1,1 +1,1 @@
-"""The real robot: its sensors and its base."""
+"""The real robot: what its devices say, and what they are told."""

@@ -8,7 +8,7 @@ from urllib.parse import urlsplit
 
 import serial
 
-from sdt_tools.errors import DeviceError
+from sdt_tools.errors import DeviceError, UsageError
 from sdt_tools.robot.p3at.config import TCP_PORT
 
 _WRITE_S: Final = 0.2
@@ -49,7 +49,7 @@ class Link(Protocol):
 
 
 def open_link(address: str, baud: int, timeout_s: float) -> Link:
-    """The wire to ``address``. Raises DeviceError, saying what to try, where there is none."""
+    """The wire to ``address``. Raises UsageError where that is no address, and DeviceError where there is no wire."""
     if "://" in address:
         return TcpLink(address, *_host_and_port(address), timeout_s)
     return SerialLink(address, baud)
@@ -62,7 +62,7 @@ def _host_and_port(address: str) -> tuple[str, int]:
     except ValueError:
         port = 0
     if parts.scheme not in _SCHEMES or not parts.hostname or not port or parts.path.strip("/"):
-        raise DeviceError(f"base address '{address}': name a serial port as /dev/ttyUSB0, or socket://HOST:PORT")
+        raise UsageError(f"base address '{address}': name a serial port as /dev/ttyUSB0, or socket://HOST:PORT")
     return parts.hostname, port
 
 

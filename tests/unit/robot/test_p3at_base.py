@@ -14,7 +14,7 @@ from base_rig import AHEAD, PORTS, QUICK, REST, driven, wait_for
 from sdt_tools.emergency import EmergencyStop
 from sdt_tools.emulation.p3at.faults import Fault, FaultKind
 from sdt_tools.emulation.p3at.server import EmulatedP3at
-from sdt_tools.errors import DeviceError
+from sdt_tools.errors import DeviceError, UsageError
 from sdt_tools.frames import Twist
 from sdt_tools.protocols import Actuator
 from sdt_tools.robot.p3at import link
@@ -225,7 +225,7 @@ def another_device(says: bytes) -> Iterator[str]:
 
 
 def refusal(address: str) -> str:
-    with pytest.raises(DeviceError) as refused:
+    with pytest.raises((DeviceError, UsageError)) as refused:
         P3atBase(P3atConfig(address=address, connect_s=0.3))
     return str(refused.value)
 

@@ -8,7 +8,7 @@ from sdt_tools.cli.console import JsonFlag, console, emit
 from sdt_tools.emulation.p3at.faults import FAULT_HELP
 
 
-def command(
+def p3at(
     host: Annotated[
         str, typer.Option(help="Address to listen on; others than loopback let the network in.")
     ] = "127.0.0.1",
