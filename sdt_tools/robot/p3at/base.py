@@ -131,7 +131,7 @@ class P3atBase:
             self._failure = error
             raise
         finally:
-            moves = self._wheel.turns or (self.status is not None and self.status.moving)
+            moves = self._wheel.turns or (self.status is not None and self.status.rolls)
             self._wheel.hold()
             self.session.close(at_once=moves)
 

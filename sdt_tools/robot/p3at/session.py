@@ -1,6 +1,6 @@
 """Beginning and ending a session with the base: synchronise, open, ask for its settings, enable; and all that back.
 
-Sources: Pioneer 3 Operations Manual, "Client-server connection"; RESEARCH measured no base.
+Sources: Pioneer 3 Operations Manual, "Client-server connection".
 """
 
 import select
@@ -19,6 +19,8 @@ from sdt_tools.robot.p3at.status import MOVING, STANDING
 
 _ANSWER_S: Final = 0.5
 _LOOK_S: Final = 0.05
+_LISTEN_S: Final = 0.25
+"""A base in a session speaks every 100 ms."""
 _SYNCS: Final = (0, 1, 2)
 _DEGREES: Final = 57.29577951308232
 
@@ -89,11 +91,15 @@ class _Talk:
         self._heard = b""
 
     def synchronise(self) -> tuple[str, str, str]:
-        """Name, kind and model of the base."""
-        self._link.write(encode(Code.CLOSE))
+        """Name, kind and model of the base.
+
+        A base that speaks unasked is still in a session, perhaps with a motion that any packet lets go on; all it is
+        told is to close it. One that is silent is not told that: CLOSE has the number of the last synchronisation.
+        """
         while monotonic() < self._until_s and not self._gives_up():
-            for _ in self._bodies(_LOOK_S):
-                pass  # what an old session still had to say
+            if any(body[0] in (STANDING, MOVING) for body in self._bodies(_LISTEN_S)):
+                self._link.write(encode(Code.CLOSE))
+                continue
             answer = b""
             for sync in _SYNCS:
                 self._link.write(packet(bytes([sync])))

@@ -45,6 +45,11 @@ class Status:
     sonar_on: bool = False
 
     @property
+    def rolls(self) -> bool:
+        """Whether a wheel turns; not every controller says so by the packet's type, ``moving``."""
+        return self.moving or bool(self.left_mmps or self.right_mmps)
+
+    @property
     def stalled(self) -> bool:
         """Whether a wheel does not turn although its motor pulls."""
         return self.left_stalled or self.right_stalled

@@ -5,6 +5,7 @@ import socket
 import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -19,6 +20,7 @@ from sdt_tools.frames import Twist
 from sdt_tools.protocols import Actuator
 from sdt_tools.robot.p3at import link
 from sdt_tools.robot.p3at.base import P3atBase
+from sdt_tools.robot.p3at.commands import Code, encode
 from sdt_tools.robot.p3at.config import P3atConfig
 from sdt_tools.robot.p3at.session import open_session
 
@@ -204,6 +206,22 @@ def test_a_session_that_another_client_has_left_open_is_taken_over() -> None:
         open_session(link.open_link(emulated.address, 9600, 1.0), config).link.close()  # as a client that dies
         with P3atBase(config) as base:
             assert wait_for(lambda: base.status is not None)
+
+
+def test_a_motion_that_a_dead_client_has_left_is_not_woken_by_the_next_one() -> None:
+    """The watchdog has stopped the base, and any packet but CLOSE would have it go on."""
+    settings = replace(QUICK, watchdog_ms=100)
+    with EmulatedP3at(PORTS["serial"](), settings=settings) as emulated:
+        config = P3atConfig(address=emulated.address)
+        left = open_session(link.open_link(emulated.address, 9600, 1.0), config).link
+        left.write(encode(Code.VEL, 300))
+        assert wait_for(lambda: emulated.report.watchdog_stops == 1)
+        assert wait_for(lambda: emulated.report.velocity == REST)
+        left.close()
+        there_m = emulated.report.pose.x_m
+        with P3atBase(config) as base:
+            assert wait_for(lambda: base.status is not None)
+            assert not wait_for(lambda: emulated.report.pose.x_m != there_m, 0.2)
 
 
 @contextmanager

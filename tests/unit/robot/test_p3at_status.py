@@ -79,3 +79,10 @@ def test_settings_that_are_cut_off_are_none(size: int) -> None:
     body = encode_settings(FACTORY)
     upto_watchdog = body.index(b"emulated\0") + len("emulated\0") + 14
     assert (decode_settings(body[: min(size, len(body))]) is not None) == (size >= upto_watchdog)
+
+
+def test_a_base_rolls_whose_wheels_turn_whatever_the_type_of_the_packet_says() -> None:
+    status = decode_status(by_hand(kind=0x32))
+    assert status is not None
+    assert status.rolls
+    assert not status.moving
