@@ -55,7 +55,6 @@ class P3atBase:
         self._clock = HostClock() if clock is None else clock
         self._arrivals = Arrivals(_ROOM)
         self._wheel = Wheel(config)
-        self._odometer = Odometer(config)
         self._closing = threading.Event()
         self._emergency_news = threading.Event()
         self._woken, self._wake = socket.socketpair()
@@ -71,6 +70,7 @@ class P3atBase:
             self._woken.close()
             self._wake.close()
             raise
+        self._odometer = Odometer(config, self.session.model)
         self._health = Health(self._low_battery_v())
         self._introduce()
         self._thread = threading.Thread(target=self._run, name=NAME, daemon=True)

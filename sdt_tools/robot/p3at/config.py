@@ -20,8 +20,8 @@ class P3atConfig(Config):
     so long is not sent any more, the last resort against a program that hangs. ``silent_s``: the base speaks ten times
     a second, and when it has not for so long it is told to stand. Accelerations are set for the session alone.
 
-    ``turn_steps``, ``position_scale`` and ``speed_scale`` turn the base's units into turns, mm and mm/s; firmware since
-    ARCOS needs no other values than these (ARIA's parameters for the p3at-sh).
+    ``turn_steps``, ``position_scale`` and ``speed_scale`` turn the base's units into turns, mm and mm/s. Without
+    ``position_scale`` it is that of the model that the base says it is.
     """
 
     address: str = "/dev/ttyUSB0"
@@ -36,5 +36,5 @@ class P3atConfig(Config):
     turn_radps2: float = Field(default=math.radians(100), gt=0, le=20)
     low_battery_v: float = Field(default=11.5, ge=0)
     turn_steps: int = Field(default=4096, gt=0)
-    position_scale: float = Field(default=1.0, gt=0)
+    position_scale: float | None = Field(default=None, gt=0)
     speed_scale: float = Field(default=1.0, gt=0)

@@ -11,6 +11,9 @@ _WRAP: Final = 1 << 15
 _JUMP_M: Final = 1.0
 """No base moves so far between two packets: its counters were set anew."""
 
+_MM_A_STEP: Final = {"p3at": 0.465, "p2at": 1.32, "p2at8": 1.32, "p2at8+": 0.465}
+"""Controllers before the SH counted in steps of their own (ARIA's parameter files); all others count millimetres."""
+
 
 class Odometer:
     """Follows the base from where it is first seen, which is the origin.
@@ -18,9 +21,10 @@ class Odometer:
     The base's counters begin anew when it is switched on or a session opened; ``reconnected`` says that they may have.
     """
 
-    def __init__(self, config: P3atConfig) -> None:
+    def __init__(self, config: P3atConfig, model: str) -> None:
+        scale = config.position_scale or _MM_A_STEP.get(model, 1.0)
         self.pose = Pose2D(0.0, 0.0, 0.0)
-        self._metres = config.position_scale / 1000.0
+        self._metres = scale / 1000.0
         self._radians = 2 * math.pi / config.turn_steps
         self._turn_steps = config.turn_steps
         self._last: Status | None = None

@@ -19,7 +19,7 @@ def at(x_mm: int, y_mm: int, heading: int = 0) -> Status:
 
 
 def after(*statuses: Status) -> Pose2D:
-    odometer = Odometer(P3atConfig())
+    odometer = Odometer(P3atConfig(), "p3at-sh")
     for status in statuses:
         assert odometer.follow(status)
     return odometer.pose
@@ -46,7 +46,7 @@ def test_the_frame_is_the_one_that_the_base_began_in() -> None:
 
 
 def test_a_base_that_begins_anew_goes_on_from_where_it_was() -> None:
-    odometer = Odometer(P3atConfig())
+    odometer = Odometer(P3atConfig(), "p3at-sh")
     for status in (at(0, 0), at(900, 0), at(900, 0, 1024)):
         odometer.follow(status)
     odometer.reconnected()
@@ -56,7 +56,7 @@ def test_a_base_that_begins_anew_goes_on_from_where_it_was() -> None:
 
 
 def test_a_jump_is_told_and_leaves_the_pose() -> None:
-    odometer = Odometer(P3atConfig())
+    odometer = Odometer(P3atConfig(), "p3at-sh")
     odometer.follow(at(0, 0))
     assert not odometer.follow(at(5000, 0))
     assert odometer.follow(at(5100, 0))
@@ -64,7 +64,7 @@ def test_a_jump_is_told_and_leaves_the_pose() -> None:
 
 
 def test_an_arc_is_followed_to_the_counters_resolution() -> None:
-    body, odometer = FreeBody(), Odometer(P3atConfig())
+    body, odometer = FreeBody(), Odometer(P3atConfig(), "p3at-sh")
     for _ in range(500):
         pose = body.pose
         steps = round(pose.yaw_rad / (2 * math.pi) * 4096)
@@ -79,3 +79,15 @@ def test_the_free_body_drives_circles_that_close() -> None:
     for _ in range(7):
         body.move(Twist(0.5, 2 * math.pi / 7), 1.0)
     assert (body.pose.x_m, body.pose.y_m) == pytest.approx((0.0, 0.0), abs=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("model", "config", "metres"), [("p3at-sh", {}, 0.1), ("p3at", {}, 0.0465), ("p3at", {"position_scale": 2.0}, 0.2)]
+)
+def test_a_step_of_the_counters_is_as_long_as_the_model_has_it(
+    model: str, config: dict[str, float], metres: float
+) -> None:
+    odometer = Odometer(P3atConfig(**config), model)
+    odometer.follow(at(0, 0))
+    odometer.follow(at(100, 0))
+    assert odometer.pose.x_m == pytest.approx(metres)
