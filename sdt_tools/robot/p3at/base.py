@@ -18,7 +18,7 @@ from sdt_tools.robot.p3at.config import P3atConfig
 from sdt_tools.robot.p3at.health import Health
 from sdt_tools.robot.p3at.link import LinkLostError, open_link
 from sdt_tools.robot.p3at.odometry import Odometer
-from sdt_tools.robot.p3at.session import Session, open_session
+from sdt_tools.robot.p3at.session import STANDSTILL, Session, open_session
 from sdt_tools.robot.p3at.status import Status, decode_status
 from sdt_tools.robot.p3at.wheel import Wheel
 
@@ -39,8 +39,8 @@ class P3atBase:
     itself when it is not commanded again for ``command_lasts_s``. Where the base falls silent, where its emergency
     button is pressed, its motors are switched off or ``emergency`` is pulled, it is told to stand and nothing commanded
     before moves it again; commands are taken again when it has come back, or the stop is released. ``close``, or the
-    end of the interpreter, leaves it standing with its motors off. What cannot be sent any more, the base's own
-    watchdog does.
+    end of the interpreter, leaves it standing with its motors off. What ends the process at once (``kill -9``, or
+    SIGTERM where nobody handles it) leaves it to the base's own watchdog.
 
     Raises DeviceError where there is no base. ``read`` gives poses, and what there is to tell.
     """
@@ -167,9 +167,10 @@ class P3atBase:
     def _send(self) -> None:
         if self._wheel.expires(monotonic_ns()):
             self._tell(LogLevel.WARNING, f"no command for {self._config.command_lasts_s:g} s: the base stops")
-        if self.emergency.reason:
-            self.session.link.write(encode(Code.ESTOP))
-        self.session.link.write(self._wheel.packets(self.status))
+        if self.emergency.reason:  # whatever the wheel says: who frees it may not have heard yet
+            self.session.link.write(b"".join((encode(Code.ESTOP), *STANDSTILL)))
+        else:
+            self.session.link.write(self._wheel.packets(self.status))
 
     def _hear(self, data: bytes) -> None:
         bad = self.session.splitter.bad_checksums
