@@ -25,8 +25,8 @@ from sdt_tools.robot.p3at.wheel import Wheel
 NAME: Final = "p3at"
 _ROOM: Final = 6000
 """Ten minutes of poses that nobody reads."""
-_SETTLES_NS: Final = 300_000_000
-"""So long after its motors were switched on the base may still say that they are off."""
+_SETTLES_NS: Final = SECOND_NS
+"""So long after its motors were switched on the base may still say that they are off, until it first says otherwise."""
 _GIVES_UP_FACTOR: Final = 3
 _TRY_AGAIN_S: Final = 0.5
 _FAREWELL_S: Final = 1.0
@@ -190,10 +190,12 @@ class P3atBase:
             self._take_commands()
         for level, text in self._health.remarks(status):
             self._tell(level, text)
-        if self._heard_ns - self._enabled_ns > _SETTLES_NS:
+        if status.motors_on and not status.button_pressed:
+            self._enabled_ns = 0
+        elif self._heard_ns - self._enabled_ns > _SETTLES_NS:
             if status.button_pressed:
                 self.emergency.pull("the base's emergency button is pressed")
-            elif not status.motors_on:
+            else:
                 self.emergency.pull("the base's motors were switched off")
         if not self._odometer.follow(status):
             self._tell(LogLevel.WARNING, "the base's odometry has jumped; it goes on from where it was")
