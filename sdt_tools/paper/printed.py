@@ -8,6 +8,7 @@ from sdt_tools.scene.scenario import STANDARD_FOLLOW
 
 TRAINING_FRAMES: Final = 2705
 VALIDATION_FRAMES: Final = 570
+TRAINING_IMAGES: Final = 1825
 
 
 @dataclass(frozen=True)
@@ -25,4 +26,19 @@ LEVELS: Final[Mapping[int, PrintedLevel]] = {
     1: PrintedLevel(99.7, 76.8, frozenset(STANDARD_FOLLOW) - _FAILED_AT_ONE),
     2: PrintedLevel(97.1, 73.4, frozenset(STANDARD_FOLLOW) - _FAILED_AT_ONE - {"through_gate"}),
     3: PrintedLevel(57.3, 53.2, frozenset()),
+}
+
+
+@dataclass(frozen=True)
+class PrintedEpsilon:
+    """One ε of Table I: accuracy on attacked training images and on clean validation images, in percent."""
+
+    attacked_train_percent: float
+    val_percent: float
+
+
+EPSILONS: Final[Mapping[int, PrintedEpsilon]] = {
+    0: PrintedEpsilon(99.7, 98.4),
+    1: PrintedEpsilon(52.0, 92.8),
+    2: PrintedEpsilon(32.5, 71.9),
 }
