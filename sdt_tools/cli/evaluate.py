@@ -50,7 +50,8 @@ def follow(
     from sdt_tools.config import load_config
     from sdt_tools.errors import UsageError
     from sdt_tools.evaluation.closed_loop import ClosedLoopConfig
-    from sdt_tools.evaluation.evaluate import evaluate_follow, parse_seeds
+    from sdt_tools.evaluation.evaluate import evaluate_follow
+    from sdt_tools.evaluation.grid import parse_seeds
     from sdt_tools.evaluation.saving import SaveRuns
     from sdt_tools.scene.scenario import STANDARD_FOLLOW
 

@@ -4,6 +4,7 @@ from pydantic import Field
 
 from sdt_tools.config import Config, RateConfig
 from sdt_tools.dataset.config import DatasetConfig
+from sdt_tools.evaluation.vision.run import VisionLoopConfig
 from sdt_tools.paper.printed import TRAINING_IMAGES
 from sdt_tools.robustness.image_attacks import ImageAttackConfig
 from sdt_tools.scene.config import SceneConfig
@@ -27,7 +28,8 @@ class VisionStudyConfig(Config):
     Each training seed, from ``first_training_seed`` on, draws images of its own, to learn from out of the practice
     recordings and to validate with out of ``unseen``. For each ε above 0 there is a control: plain training on the schedule of
     the attacked networks. ``attack`` says how hard trained networks are attacked, on ``attacked_images`` validation
-    images. The networks of the first training seed are driven through the scenarios.
+    images. The networks of the first training seed are driven through the scenarios, ``follow`` at the wheel while the
+    robot is active: a follow network's folder, or expert.
     """
 
     training_seeds: int = Field(default=3, ge=1)
@@ -44,3 +46,5 @@ class VisionStudyConfig(Config):
     attacked_images: int = Field(default=300, ge=3)
     first_reported_seed: int = Field(default=2000, ge=1000)
     runs: int = Field(default=20, ge=1)
+    follow: str = "expert"
+    evaluation: VisionLoopConfig = VisionLoopConfig()

@@ -43,6 +43,11 @@ class Walker:
         self._spread_m = 0.0
         self._stand_by(layout.robot)
 
+    @property
+    def at_end(self) -> bool:
+        """Whether he stands at the last point of his path, resting there or for good."""
+        return self._next == len(self._plan.path_m)
+
     def advance(self, time_s: float, dt_s: float, robot: Pose2D, lidar: Pose2D, signals: bool = False) -> None:
         """Live from ``time_s`` on for ``dt_s``, seeing the robot's centre and its LiDAR at these poses.
 

@@ -77,6 +77,11 @@ class World:
         return self._walker.done
 
     @property
+    def operator_at_end(self) -> bool:
+        """Whether he stands at the last point of his path, resting there or for good."""
+        return self._walker.at_end
+
+    @property
     def operator_standing(self) -> bool:
         """Whether he stands: resting, waiting for the robot, or at the end of his path."""
         return self._walker.standing
