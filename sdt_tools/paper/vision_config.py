@@ -26,10 +26,10 @@ class VisionStudyConfig(Config):
     """The study's sizes. Practice seeds lie below 1,000; people and rooms of ``unseen`` have seeds from there on.
 
     Each training seed, from ``first_training_seed`` on, draws images of its own, to learn from out of the practice
-    recordings and to validate with out of ``unseen``. For each ε above 0 there is a control: plain training on the schedule of
-    the attacked networks. ``attack`` says how hard trained networks are attacked, on ``attacked_images`` validation
-    images. The networks of the first training seed are driven through the scenarios, ``follow`` at the wheel while the
-    robot is active: a follow network's folder, or expert.
+    recordings and to validate with out of ``unseen``. A control is trained plainly on the schedule of the attacked
+    networks. ``attack`` says how hard trained networks are attacked, on ``attacked_images`` validation images. The
+    networks of the first training seed are driven through the scenarios, ``follow`` at the wheel while the robot is
+    active: a follow network's folder, or expert.
     """
 
     training_seeds: int = Field(default=3, ge=1)

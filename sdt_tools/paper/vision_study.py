@@ -1,4 +1,4 @@
-"""The vision study, from recordings to tables: Tables I and V of the paper with intervals, and how networks are fooled."""
+"""The vision study, from recordings to tables: Tables I and V of the paper with intervals, and attacks."""
 
 import shutil
 from functools import partial
