@@ -5,6 +5,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from sdt_tools.cli import evaluate_vision
 from sdt_tools.cli.console import JsonFlag, console, emit
 
 if TYPE_CHECKING:
@@ -19,6 +20,9 @@ app = typer.Typer(no_args_is_help=True, help="Drive networks through scenarios a
 @app.callback()
 def evaluate() -> None:
     """Drive networks through scenarios and count what comes of it."""
+
+
+app.command("vision")(evaluate_vision.command)
 
 
 @app.command("follow")

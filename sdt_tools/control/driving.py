@@ -23,7 +23,10 @@ from sdt_tools.recording.writer import RecordingWriter
 
 @dataclass(frozen=True)
 class Wheel:
-    """Who drives what, how often, and how fast each motion is. ``expert`` is asked beside, where there is one."""
+    """Who drives what, how often, and how fast each motion is. ``expert`` is asked beside, where there is one.
+
+    Of a ``simulated`` source the stamps are no times of arrival: a scan arrives when the loop is given it.
+    """
 
     source: Source
     actuator: Actuator
@@ -31,6 +34,7 @@ class Wheel:
     rates: RateConfig
     motions: MotionConfig
     expert: Expert | None = None
+    simulated: bool = False
 
 
 @dataclass(frozen=True)
@@ -65,7 +69,7 @@ def drive(
     and source and observers are closed; the writer and the chooser are the caller's to close. Raises RunError where the
     source fails, RecordingError where the disk refuses.
     """
-    stopwatch = Stopwatch(wheel.actuator, clock)
+    stopwatch = Stopwatch(wheel.actuator, None if wheel.simulated else clock)
     watching = [stopwatch, *observers]
     with nullcontext(interrupt) if interrupt is not None else deferred_interrupt() as heard:
         if writer is None:

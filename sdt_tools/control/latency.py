@@ -42,7 +42,7 @@ class Stopwatch:
     """Stands before an actuator, and sees what passes. Implements Actuator and Observer.
 
     A command's delay runs from when the scan that it was decided on was received, by ``clock``, until the actuator has
-    taken the command. Without a clock, in a scene that runs as fast as it can, it runs from when the scan was seen.
+    taken the command. Without a clock, in a scene, it runs from when the scan was seen.
     """
 
     def __init__(self, actuator: Actuator, clock: HostClock | None) -> None:

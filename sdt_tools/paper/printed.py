@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Final
 
-from sdt_tools.scene.scenario import STANDARD_FOLLOW
+from sdt_tools.scene.scenario import STANDARD_FOLLOW, STANDARD_VISION
 
 TRAINING_FRAMES: Final = 2705
 VALIDATION_FRAMES: Final = 570
@@ -42,3 +42,9 @@ EPSILONS: Final[Mapping[int, PrintedEpsilon]] = {
     1: PrintedEpsilon(52.0, 92.8),
     2: PrintedEpsilon(32.5, 71.9),
 }
+
+MODE_ERRORS: Final[Mapping[int, Mapping[str, int]]] = {
+    epsilon: dict(zip(STANDARD_VISION, counts, strict=True))
+    for epsilon, counts in {0: (1, 0, 0, 1, 0, 0, 0), 1: (0, 1, 0, 0, 1, 0, 0), 2: (5, 3, 1, 4, 1, 3, 1)}.items()
+}
+"""Table V: mode errors by adversarial training radius and scenario, of one run each."""

@@ -16,6 +16,7 @@ from sdt_tools.evaluation.vision.results import (
     DECISIONS_FILE,
     RUNS_FILE,
     VisionTally,
+    errors_while,
     spreads,
     tallies,
     totals,
@@ -39,13 +40,14 @@ _RECORDINGS: Final = "recordings"
 class VisionSummary:
     """Tallies by model (as it was named in the call) and scenario, and where tables and recordings lie.
 
-    ``total`` pools a model's scenarios, ``spread`` tests whether its errors are as frequent in each. ``run_s`` is the
-    mean time of a run, on one thread.
+    ``total`` pools a model's scenarios, ``spread`` tests whether its errors are as frequent in each. ``errors_while``
+    counts them by what else the operator was doing. ``run_s`` is the mean processor time of a run.
     """
 
     models: Mapping[str, Mapping[str, VisionTally]]
     total: Mapping[str, VisionTally]
     spread: Mapping[str, Evenness]
+    errors_while: Mapping[str, Mapping[str, int]]
     run_s: float
     runs: Path
     decisions: Path
@@ -87,11 +89,12 @@ def evaluate_vision(
     by_model = {model: [next(folders) for _ in group] for model, group in units.items()}
     every = [folder for group in by_model.values() for folder in group]
     runs = gather(by_model, RUNS_FILE, out)
-    gather(by_model, DECISIONS_FILE, out)
+    decisions = gather(by_model, DECISIONS_FILE, out)
     return VisionSummary(
         models=tallies(runs),
         total=totals(runs),
         spread=spreads(runs),
+        errors_while=errors_while(decisions, models),
         run_s=_busy_s(every) / len(runs),
         runs=out / RUNS_FILE,
         decisions=out / DECISIONS_FILE,
@@ -106,13 +109,13 @@ def run_vision_block(
     name, eyes_for = reader_for(model)
     policy = policy_for(follow)
     driver, config_toml = f"{name}+{policy.name}", dump_config(config)
-    started_s = time.perf_counter()
+    started_s = time.process_time()
     runs, recordings = [], []
     for layout in layouts:
         kept = KeptMessages()
         runs.append(drive_run(layout, eyes_for, policy, config, [] if save is SaveRuns.NONE else [kept]))
         recordings.append(keep_run(out / _RECORDINGS, layout, driver, kept, runs[-1], save, config_toml))
-    busy_s = time.perf_counter() - started_s
+    busy_s = time.process_time() - started_s
     write_runs(out, runs, recordings)
     (out / _TIMING_FILE).write_text(json.dumps({"busy_s": busy_s}) + "\n", encoding="utf-8")
 

@@ -10,6 +10,7 @@ import polars as pl
 from sdt_tools.evaluation.vision.run import VisionRun
 from sdt_tools.evaluation.vision.spread import Evenness, count_interval, evenness_of
 from sdt_tools.evaluation.vision.whole_run import WholeOutcome
+from sdt_tools.frames import Gesture
 from sdt_tools.statistics import wilson
 
 RUNS_FILE = "runs.parquet"
@@ -99,6 +100,20 @@ def spreads(runs: pl.DataFrame) -> dict[str, Evenness]:
         }
         result[str(model)] = evenness_of(wide["mode_errors"].astype(np.int64), wide["exposed"].astype(np.float64))
     return result
+
+
+def errors_while(decisions: pl.DataFrame, models: Sequence[str]) -> dict[str, dict[str, int]]:
+    """By model, mode errors by what the operator was doing, the most frequent first.
+
+    That is a behaviour, a gesture that he showed (misread as the other one), or ``nothing else``.
+    """
+    gesture = pl.when(pl.col("shown") != Gesture.IDLE.label).then(pl.col("shown"))
+    doing = pl.coalesce(gesture, pl.when(pl.col("behaviour") != "").then(pl.col("behaviour")), pl.lit("nothing else"))
+    wrong = decisions.filter(pl.col("error")).with_columns(doing.alias("doing"))
+    counted = wrong.group_by("model", "doing").len().sort("len", "doing", descending=[True, False])
+    return {
+        model: dict(counted.filter(pl.col("model") == model).select("doing", "len").iter_rows()) for model in models
+    }
 
 
 def _counted(runs: pl.DataFrame, counts: Sequence[int]) -> VisionTally:

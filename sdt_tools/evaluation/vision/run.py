@@ -121,7 +121,7 @@ def drive_run(
     follow: Driver = PolicyAtTheWheel(policy, source.expert)
     controller = Controller(follow, eyes_for(source), scene.rates, config.controller, book.note)
     judge = WholeRunJudge(world, config.success, config.whole)
-    wheel = Wheel(source, source, controller, scene.rates, scene.motions, source.expert)
+    wheel = Wheel(source, source, controller, scene.rates, scene.motions, source.expert, simulated=True)
     summary = drive(wheel, [judge, *observers], interrupt=Interrupt())
     if summary.ending is Ending.INTERRUPTED:
         raise KeyboardInterrupt
