@@ -99,7 +99,9 @@ def predict_pictures(
         surroundings=pl.lit(session.get("surroundings") or None),
         mask=pl.lit({"yes": True, "no": False}.get(session.get("mask", ""))),
     )
-    return PictureRows(rows.select(pl.col(name).cast(dtype) for name, dtype in PICTURE_SCHEMA.items()), tuple(unreadable_ns))
+    return PictureRows(
+        rows.select(pl.col(name).cast(dtype) for name, dtype in PICTURE_SCHEMA.items()), tuple(unreadable_ns)
+    )
 
 
 def _batches(

@@ -1,8 +1,8 @@
 """Predictions as files: Parquet, one row a frame and model, with what is needed to ask why a frame is wrong.
 
-A file holds the answers of follow networks to scans, or those of vision networks to pictures; each kind has its columns.
-It says in its metadata that it holds predictions, and which classes its logits stand for. Whatever a recording does
-not know (the operator in a real drive, the label of an unlabelled frame) is null.
+A file holds the answers of follow networks to scans, or those of vision networks to pictures; each kind has its
+columns. It says in its metadata that it holds predictions, and which classes its logits stand for. Whatever a recording
+does not know (the operator in a real drive, the label of an unlabelled frame) is null.
 """
 
 from collections.abc import Container, Sequence
@@ -93,7 +93,7 @@ SCHEMAS: Final = {PredictionKind.SCANS: SCHEMA, PredictionKind.PICTURES: PICTURE
 
 def kind_of(columns: Container[str]) -> PredictionKind:
     """The kind of predictions that have these columns."""
-    return PredictionKind.PICTURES if "features" in columns else PredictionKind.SCANS
+    return PredictionKind.PICTURES if "brightness" in columns else PredictionKind.SCANS
 
 
 def scan_predictions(paths: Sequence[Path]) -> pl.LazyFrame:

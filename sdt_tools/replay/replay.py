@@ -31,7 +31,6 @@ from sdt_tools.runs.code import code_version
 from sdt_tools.runs.local import Progress
 from sdt_tools.runs.unit import content_hash
 
-
 LABELLED_AS: Final = {PredictionKind.SCANS: LabelKind.MOTION, PredictionKind.PICTURES: LabelKind.GESTURE}
 """What labels say of each kind of frame."""
 

@@ -39,7 +39,8 @@ class Signals:
         after = np.searchsorted(changes_ns, stamps_ns)
         later_ns = np.abs(changes_ns[np.minimum(after, len(changes_ns) - 1)] - stamps_ns)
         earlier_ns = np.abs(stamps_ns - changes_ns[np.maximum(after - 1, 0)])
-        return np.minimum(later_ns, earlier_ns) * 1e-9
+        nearest_s: Float64[np.ndarray, "frames"] = np.minimum(later_ns, earlier_ns) * 1e-9
+        return nearest_s
 
 
 def read_signals(recording: Recording) -> Signals:

@@ -99,7 +99,10 @@ class Tracks:
         x_m, y_m, _ = self.robot.at(stamps_ns)
         operator_x_m, operator_y_m, operator_yaw_rad = self.operator.at(stamps_ns)
         to_robot_rad = np.arctan2(y_m - operator_y_m, x_m - operator_x_m)
-        return np.abs((operator_yaw_rad - to_robot_rad + np.pi) % (2 * np.pi) - np.pi)
+        turned_rad: Float64[np.ndarray, "frames"] = np.abs(
+            (operator_yaw_rad - to_robot_rad + np.pi) % (2 * np.pi) - np.pi
+        )
+        return turned_rad
 
     def commands_at(self, stamps_ns: Int64[np.ndarray, "frames"]) -> list[MotionCommand | None]:
         """The command in force at each stamp; None where there was none, or it had run out."""

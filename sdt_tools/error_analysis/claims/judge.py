@@ -33,9 +33,10 @@ from sdt_tools.error_analysis.claims.propositions import (
 )
 from sdt_tools.error_analysis.claims.theorem import judge_theorem
 from sdt_tools.error_analysis.claims.verdict import ClaimVerdict, undecided
-from sdt_tools.error_analysis.distance import estimate_epsilon
+from sdt_tools.error_analysis.epsilon import estimate_epsilon
 from sdt_tools.error_analysis.recorded import find_recordings, read_situations
 from sdt_tools.error_analysis.side_by_side import KEYS, load_side_by_side
+from sdt_tools.error_analysis.spaces import scan_space
 from sdt_tools.errors import OutputExistsError, UsageError
 from sdt_tools.frames import MAX_RANGE_M, MotionClass
 from sdt_tools.models.checkpoint import load_checkpoint
@@ -195,13 +196,13 @@ def _judge_propositions(
         missing = [undecided(claim, network.name, STATEMENTS[claim], NO_SCANS) for claim in (PROPOSITION_1, TRANSIENT)]
         return [*missing, systematic]
     situations = np.minimum(scans, np.float32(options.errors.clip_m))
-    epsilon = estimate_epsilon(situations, frames.recording, frames.stamp_ns, options.errors)
+    epsilon = estimate_epsilon(scan_space(situations), frames.recording, frames.stamp_ns, options.errors)
     places = {motion.label: int(motion) for motion in MotionClass}
     labels = np.array([places[label] for label in frames.table["label"]])
     loaded = load_checkpoint(network.folder)
     return [
         judge_proposition_1(loaded.network, network.name, scans, labels, options),
-        judge_transients(frames, network.name, situations, epsilon.epsilon_m, options),
+        judge_transients(frames, network.name, situations, epsilon.value, options),
         systematic,
     ]
 

@@ -17,6 +17,7 @@ from sdt_tools.error_analysis.explain import explain
 from sdt_tools.error_analysis.labelled import load_labelled
 from sdt_tools.error_analysis.recorded import find_recordings, read_situations
 from sdt_tools.error_analysis.report.document import ErrorReport, summarise
+from sdt_tools.error_analysis.spaces import scan_space
 from sdt_tools.errors import ConfigError, OutputExistsError, RecordingError, SdtError, UsageError
 from sdt_tools.replay.replay import replay
 
@@ -56,7 +57,7 @@ def report_of(predictions: Path, material: Material, options: ErrorOptions = OPT
     """The analysis without its files."""
     frames = load_labelled(predictions, options)
     scans, _ = read_situations(frames, find_recordings(frames, [material.recordings]), options)
-    return summarise(frames, explain(frames, scans, options), options)
+    return summarise(frames, explain(frames, scan_space(scans), options), options)
 
 
 @pytest.fixture(scope="module")
