@@ -81,7 +81,7 @@ def test_the_folder_holds_tags_report_and_figures(analysed: tuple[ErrorReport, P
     files = ["epsilon.png", "errors.json", "report.html", "tags.parquet", "tags.png"]
     assert sorted(path.name for path in out.iterdir()) == files
     document = json.loads((out / "errors.json").read_text())
-    assert document["options"] == OPTIONS.model_dump(mode="json")
+    assert document["options"] == ErrorOptions(neighbourhood="scan").model_dump(mode="json")
     assert len(document["inputs"]["recordings"]) == 10
     tags = pl.read_parquet(out / "tags.parquet")
     assert dict(tags.group_by("tag").len().rows()) == {"conditional": 70, "correct": 130}
@@ -157,7 +157,7 @@ def test_a_disk_without_room_for_scans_is_named(
         raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
 
     monkeypatch.setattr(os, "posix_fallocate", refuse)
-    with pytest.raises(SdtError, match=r"no room for .* GB of scans \(No space left on device\); free some"):
+    with pytest.raises(SdtError, match=r"no room for .* GB to compare frames \(No space left on device\); free some"):
         analyse_errors(material.predictions, [material.recordings], OPTIONS, tmp_path / "errors")
     assert list(tmp_path.iterdir()) == []
 
