@@ -166,7 +166,9 @@ def _read_bytes(path: Path) -> bytes:
     try:
         return path.read_bytes()
     except FileNotFoundError:
-        raise CheckpointError(f"{path}: missing, so {path.parent} is not a whole checkpoint; copy it again, or train it") from None
+        raise CheckpointError(
+            f"{path}: missing, so {path.parent} is not a whole checkpoint; copy it again, or train it"
+        ) from None
     except OSError as error:
         raise CheckpointError(f"{path}: cannot be read: {error.strerror or error}") from None
 
