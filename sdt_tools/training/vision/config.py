@@ -69,7 +69,7 @@ _ATTACKED_EPOCHS: Final = 9
 
 
 def vision_recipe(backbone: str, epsilon: int, epochs: int | None = None) -> VisionTrainingConfig:
-    """The settings that a training without a configuration starts from; the first half of an attacked one's epochs is plain.
+    """The settings that a training without a configuration starts from; an attacked one's first half is plain.
 
     Raises UsageError for an unknown backbone.
     """
