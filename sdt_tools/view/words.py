@@ -11,7 +11,7 @@ from sdt_tools.view.decisions import Labels, ModelTrack
 from sdt_tools.view.palette import Rgb
 from sdt_tools.view.timeline import Rows, changes, send, when
 
-Line = tuple[str, Int64[np.ndarray, "samples"], list[str]]
+Line = tuple[str, Int64[np.ndarray, "_"], list[str]]
 """A line of words: its entity, and what it says at which stamps."""
 
 
