@@ -35,7 +35,9 @@ def test_every_kind_of_place_light_and_behaviour_comes_up(layouts: list[Layout])
     assert 3 < sum(layout.mask is True for layout in layouts) < 20
 
 
-def test_signals_are_as_frequent_as_each_other_and_half_of_the_idle_time_looks_like_something(layouts: list[Layout]) -> None:
+def test_signals_are_as_frequent_as_each_other_and_half_of_the_idle_time_looks_like_something(
+    layouts: list[Layout],
+) -> None:
     moments = [(layout, time_s) for layout in layouts for time_s in np.arange(0.0, 38.0, 0.25).tolist()]
 
     gestures = Counter(gesture_at(layout.gestures, time_s) for layout, time_s in moments)
