@@ -37,7 +37,7 @@ SMALLER = {
     "--out analysis/my_careful_vision": "--out analysis/my_careful_vision --epochs 1 --width 64 --height 48",
     "analysis/my_vision analysis/gestures": "analysis/my_vision analysis/gestures --images 6 --steps 1",
     "--record recordings/summoned.mcap": "--record recordings/summoned.mcap --seconds 2 --fast",
-    "--follow analysis/my_follow --save-runs failed": "--follow analysis/my_follow --scenario summoned_plain --seeds 1000",
+    "my_careful_vision --follow": "my_careful_vision --scenario summoned_plain --seeds 1000 --follow",
     "--seeds 1000-1019": "--seeds 1000-1001",
     "--out analysis/my_certified\n": "--out analysis/my_certified --epochs 2 --delta 1000\n",
     "--export analysis/my_certified_onnx": "--export analysis/my_certified_onnx --restarts 1 --steps 1",

@@ -40,8 +40,8 @@ def count_interval(counts: Sequence[int], confidence: float = 0.95) -> tuple[flo
 class Evenness:
     """Whether ``errors`` spread over scenarios as their exposure does: ``expected`` by scenario if they do.
 
-    ``p_value`` is None where there is no error, or but one scenario. ``decided`` says that there are enough errors, one a scenario on
-    average, for an uneven spread to show.
+    ``p_value`` is None where there is no error, or but one scenario. ``decided`` says that there are enough errors, one
+    a scenario on average, for an uneven spread to show.
     """
 
     errors: int
