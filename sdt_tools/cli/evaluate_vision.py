@@ -172,7 +172,7 @@ def _show(summary: "VisionSummary", pictures: "Sequence[Path]") -> None:
 def spread_words(one: "Evenness") -> str:
     """Whether errors spread evenly over the scenarios, in words."""
     if one.p_value is None:
-        return "no mode errors, so nothing to spread over scenarios"
+        return f"{one.errors} mode errors" if one.errors else "no mode errors"
     tested = f"{one.errors} mode errors, evenly spread over scenarios: p = {one.p_value:.2g}"
     if not one.decided:
         return f"{tested}, too few to tell"

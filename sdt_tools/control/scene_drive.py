@@ -53,7 +53,7 @@ class SceneCrew:
 
     follow: Callable[[SceneSource], Driver]
     network: GestureNetwork | None = None
-    observers: Callable[[SceneSource], Sequence[Observer]] = lambda source: ()  # noqa: ARG005
+    observers: Callable[[SceneSource], Sequence[Observer]] = lambda _: ()
     told: Callable[[VisionDecision], None] | None = None
     seat: Callable[[Controller, SceneSource], Chooser] | None = None
 

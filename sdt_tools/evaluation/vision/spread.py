@@ -40,8 +40,8 @@ def count_interval(counts: Sequence[int], confidence: float = 0.95) -> tuple[flo
 class Evenness:
     """Whether ``errors`` spread over scenarios as their exposure does: ``expected`` by scenario if they do.
 
-    ``p_value`` is None where there is no error. ``decided`` says that there are enough errors, one a scenario on
-    average, for an uneven spread to show.
+    ``p_value`` is None where there is no error, or but one scenario. ``decided`` says that there are enough errors, one
+    a scenario on average, for an uneven spread to show.
     """
 
     errors: int
@@ -67,8 +67,8 @@ def evenness_of(
     total, exposed = int(counts.sum()), float(exposure.sum())
     rate = total / exposed if exposed > 0 else 0.0
     expected = tuple((rate * exposure.sum(axis=0)).tolist())
-    if total == 0:
-        return Evenness(0, expected, None)
+    if total == 0 or counts.shape[1] < 2:
+        return Evenness(total, expected, None)
     safe = np.maximum(exposure, 1e-12)
     residuals = np.where(exposure > 0, (counts - rate * exposure) / np.sqrt(safe), 0.0)
     observed = _statistic(residuals[None])[0]

@@ -86,3 +86,7 @@ def test_without_errors_there_is_nothing_to_test() -> None:
     one = evenness_of(np.zeros((20, 7), np.int64), np.full((20, 7), 200.0))
 
     assert (one.errors, one.p_value, one.decided) == (0, None, False)
+
+
+def test_one_scenario_alone_is_nothing_to_spread_over() -> None:
+    assert evenness_of(np.ones((20, 1), np.int64), np.full((20, 1), 200.0)).p_value is None
