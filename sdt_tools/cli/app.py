@@ -30,6 +30,7 @@ VERBS = (
     "attack",
     "check",
     "evaluate",
+    "drive",
     "replay",
     "errors",
     "view",
