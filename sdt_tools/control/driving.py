@@ -7,16 +7,16 @@ from time import perf_counter
 
 from sdt_tools.clock import SECOND_NS, HostClock
 from sdt_tools.config import MotionConfig, RateConfig
-from sdt_tools.control.latency import Latency, Stopwatch, latency_of
+from sdt_tools.control.latency import Latency, Stopwatch, WireTimes, latency_of
 from sdt_tools.frames import LogEntry, Received
-from sdt_tools.protocols import Actuator, Chooser, Expert, Observer, Source
+from sdt_tools.protocols import Actuator, Chooser, Driver, Expert, Observer, Source
 from sdt_tools.recording.live.control import Control, Wish
 from sdt_tools.recording.live.decide import Deciders, DecisionLoop
 from sdt_tools.recording.live.encoder import PictureEncoder
 from sdt_tools.recording.live.interrupt import Interrupt, deferred_interrupt
 from sdt_tools.recording.live.loop import LiveLoop
 from sdt_tools.recording.live.outcome import Ending, RecordingProgress, RecordingSummary
-from sdt_tools.recording.live.pace import paced
+from sdt_tools.recording.live.pace import Arrival, paced
 from sdt_tools.recording.live.record import record
 from sdt_tools.recording.writer import RecordingWriter
 
@@ -25,16 +25,20 @@ from sdt_tools.recording.writer import RecordingWriter
 class Wheel:
     """Who drives what, how often, and how fast each motion is. ``expert`` is asked beside, where there is one.
 
-    Of a ``simulated`` source the stamps are no times of arrival: a scan arrives when the loop is given it.
+    Without a ``chooser`` nobody moves the robot. ``arrival`` waits for the source's next scan; without it the source is
+    read once a scan period. ``wire`` knows when commands were sent. Of a ``simulated`` source the stamps are no times
+    of arrival: a scan arrives when the loop is given it.
     """
 
     source: Source
     actuator: Actuator
-    chooser: Chooser
+    chooser: Driver | Chooser | None
     rates: RateConfig
     motions: MotionConfig
     expert: Expert | None = None
     simulated: bool = False
+    arrival: Arrival | None = None
+    wire: WireTimes | None = None
 
 
 @dataclass(frozen=True)
@@ -69,7 +73,7 @@ def drive(
     and source and observers are closed; the writer and the chooser are the caller's to close. Raises RunError where the
     source fails, RecordingError where the disk refuses.
     """
-    stopwatch = Stopwatch(wheel.actuator, None if wheel.simulated else clock)
+    stopwatch = Stopwatch(wheel.actuator, None if wheel.simulated else clock, wheel.wire)
     watching = [stopwatch, *observers]
     with nullcontext(interrupt) if interrupt is not None else deferred_interrupt() as heard:
         if writer is None:
@@ -89,6 +93,7 @@ def drive(
             progress=progress,
             interrupt=heard,
             control=control,
+            arrival=wheel.arrival,
         )
     return DriveSummary(
         summary.ending,
@@ -113,7 +118,7 @@ def _drive_unrecorded(
 ) -> DriveSummary:
     source, rates = wheel.source, wheel.rates
     decisions = DecisionLoop(Deciders(wheel.chooser, wheel.expert), wheel.motions, rates, source.start_ns)
-    pace = paced(source.start_ns, rates.scan_hz, clock)
+    pace = paced(source.start_ns, rates.scan_hz, clock, arrival=wheel.arrival)
     recorder = _Unrecorded(source.start_ns, seconds, control, lambda: pace.missed + decisions.missed)
     encoder = PictureEncoder(behind=clock is not None)
     loop = LiveLoop(source, stopwatch, decisions, pace, observers, recorder, progress, encoder)

@@ -33,9 +33,9 @@ Perturb = Callable[[MotionClass], MotionClass]
 
 @dataclass(frozen=True)
 class Deciders:
-    """Who chooses the motion, who knows the right one, and what disturbs the choice."""
+    """Who chooses the motion, if anybody, who knows the right one, and what disturbs the choice."""
 
-    driver: Driver | Chooser
+    driver: Driver | Chooser | None
     expert: Expert | None = None
     perturb: Perturb | None = None
 
@@ -75,6 +75,9 @@ class DecisionLoop:
 
     def decide(self, now_ns: int) -> MotionCommand | None:
         """The command for this moment, or None where no decision is due or nothing new is there to decide on."""
+        driver = self._deciders.driver
+        if driver is None:
+            return None
         due = int((now_ns - self._start_ns) // self._period_ns)
         expected = due if self._next is None else self._next
         if due < expected or self._scan is None or self._scan is self._decided_on:
@@ -82,7 +85,7 @@ class DecisionLoop:
         self.missed += due - expected
         self._next = due + 1
         self._decided_on = self._scan
-        command = self._command(self._scan, Observation(now_ns, self._scan, self._image))
+        command = self._command(driver, self._scan, Observation(now_ns, self._scan, self._image))
         self._moving = command.motion is not MotionClass.STAY
         return command
 
@@ -103,10 +106,9 @@ class DecisionLoop:
         news, self._news = self._news, []
         return news
 
-    def _command(self, scan: LidarScan, observation: Observation) -> MotionCommand:
+    def _command(self, driver: Driver | Chooser, scan: LidarScan, observation: Observation) -> MotionCommand:
         deciders = self._deciders
         expert = None if deciders.expert is None else deciders.expert.advise()
-        driver = deciders.driver
         choice = (
             driver.choose(observation)
             if isinstance(driver, Chooser)

@@ -9,6 +9,12 @@ from sdt_tools.clock import SECOND_NS, HostClock, Pacer
 PATIENCE_S: Final = 0.05
 """A source that takes longer to read, as a scene on a slow machine, is left for a moment: the driver is to decide."""
 
+_LOOKS_UP_S: Final = 0.05
+"""Signals and keys are heard so often where nothing arrives."""
+
+Arrival = Callable[[float], bool]
+"""Waits for something to have arrived, at most so many seconds; whether it has."""
+
 
 @runtime_checkable
 class Pace(Protocol):
@@ -72,8 +78,37 @@ class RealPace:
         return self._clock.now_ns() - self._released_ns > PATIENCE_S * SECOND_NS
 
 
+class ArrivalPace:
+    """Ticks whenever something has arrived, so that it is decided on at once; and where nothing comes, now and then."""
+
+    def __init__(self, clock: HostClock, scan_hz: float, arrival: Arrival) -> None:
+        self.missed = 0
+        self._clock = clock
+        self._arrival = arrival
+        self._period_ns = round(SECOND_NS / scan_hz)
+        self._released_ns: int | None = None
+
+    def next_ns(self) -> int:
+        """Wait for an arrival; the host's time then."""
+        if self._released_ns is not None:
+            self.missed += (self._clock.now_ns() - self._released_ns) // self._period_ns
+        self._arrival(max(2.5 * self._period_ns / SECOND_NS, _LOOKS_UP_S))
+        self._released_ns = self._clock.now_ns()
+        return self._released_ns
+
+    def takes_long(self) -> bool:
+        """Whether the tick came ``PATIENCE_S`` ago."""
+        return self._released_ns is not None and self._clock.now_ns() - self._released_ns > PATIENCE_S * SECOND_NS
+
+
 def paced(
-    start_ns: int, scan_hz: float, clock: HostClock | None, sleep_s: Callable[[float], None] = sleep
-) -> FastPace | RealPace:
-    """A tick a scan, at the pace of ``clock``; without one, as fast as it can."""
+    start_ns: int,
+    scan_hz: float,
+    clock: HostClock | None,
+    sleep_s: Callable[[float], None] = sleep,
+    arrival: Arrival | None = None,
+) -> FastPace | RealPace | ArrivalPace:
+    """A tick a scan, at its ``arrival`` or else at the pace of ``clock``; without one, as fast as it can."""
+    if clock is not None and arrival is not None:
+        return ArrivalPace(clock, scan_hz, arrival)
     return FastPace(start_ns, scan_hz) if clock is None else RealPace(clock, scan_hz, sleep_s)

@@ -16,7 +16,7 @@ from sdt_tools.recording.live.encoder import Encode, PictureEncoder, encode_jpeg
 from sdt_tools.recording.live.interrupt import Interrupt, deferred_interrupt
 from sdt_tools.recording.live.loop import LiveLoop
 from sdt_tools.recording.live.outcome import Ending, RecordingProgress, RecordingSummary
-from sdt_tools.recording.live.pace import paced
+from sdt_tools.recording.live.pace import Arrival, paced
 from sdt_tools.recording.live.pressure import QueueLimits
 from sdt_tools.recording.live.sink import DirectSink, QueuedSink
 from sdt_tools.recording.live.take import Take, Tally
@@ -26,7 +26,7 @@ from sdt_tools.recording.writer import RecordingWriter
 def record(
     source: Source,
     actuator: Actuator,
-    driver: Driver | Chooser,
+    driver: Driver | Chooser | None,
     expert: Expert | None,
     writer: RecordingWriter,
     observers: Sequence[Observer],
@@ -43,20 +43,22 @@ def record(
     disk: DiskWatch | None = None,
     encode: Encode = encode_jpeg,
     control: Control | None = None,
+    arrival: Arrival | None = None,
 ) -> RecordingSummary:
-    """Record ``source`` for ``seconds`` (without, until it ends) while ``driver`` moves ``actuator``.
+    """Record ``source`` for ``seconds`` (without, until it ends) while ``driver``, if any, moves ``actuator``.
 
-    The source is read in ticks of one scan period; with ``realtime`` ticks keep the pace of ``clock``, the host's
-    unless another is given, a thread of its own writes and another one encodes raw pictures by ``encode``: what they
-    cannot keep up with is dropped as ``pressure`` says, and the recording ends before the ``disk`` is full. Ctrl-C,
-    SIGTERM and SIGHUP end the recording as if its time were up, and the summary says so; ``interrupt`` is what hears
-    them, where the caller listens already. Whoever holds ``control`` may pause, mark and end it. On every way out the
-    robot is told to stand still, and source and observers are closed; the writer is the caller's to close.
+    The source is read in ticks of one scan period, or at each ``arrival`` where it tells of those; with ``realtime``
+    ticks keep the pace of ``clock``, the host's unless another is given, a thread of its own writes and another one
+    encodes raw pictures by ``encode``: what they cannot keep up with is dropped as ``pressure`` says, and the recording
+    ends before the ``disk`` is full. Ctrl-C, SIGTERM and SIGHUP end the recording as if its time were up, and the
+    summary says so; ``interrupt`` is what hears them, where the caller listens already. Whoever holds ``control`` may
+    pause, mark and end it. On every way out the robot is told to stand still, and source and observers are closed; the
+    writer is the caller's to close.
 
     Raises RunError where the source fails, after a word in ``/session/log``; RecordingError where the disk refuses.
     """
     decisions = DecisionLoop(Deciders(driver, expert, perturb), motions, rates, source.start_ns)
-    pace = paced(source.start_ns, rates.scan_hz, (clock or HostClock()) if realtime else None, sleep_s)
+    pace = paced(source.start_ns, rates.scan_hz, (clock or HostClock()) if realtime else None, sleep_s, arrival)
     sink = QueuedSink(writer, limits, disk) if realtime else DirectSink(writer)
 
     def tally() -> Tally:

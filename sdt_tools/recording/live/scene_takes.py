@@ -2,7 +2,6 @@
 
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import nullcontext
-from dataclasses import dataclass
 from pathlib import Path
 
 from pydantic import Field
@@ -21,9 +20,9 @@ from sdt_tools.recording.live.outcome import ENDING_BY_SIGNAL, Ending, Recording
 from sdt_tools.recording.live.pace import paced
 from sdt_tools.recording.live.perturb import perturbation_of
 from sdt_tools.recording.live.scene_session import MakeDriver, SceneRecordingConfig, warm_up
-from sdt_tools.recording.live.session_folder import SessionFolder, SessionRecord
+from sdt_tools.recording.live.session_folder import SessionFolder
 from sdt_tools.recording.live.take import Tally
-from sdt_tools.recording.live.takes import TakeRecorder
+from sdt_tools.recording.live.takes import SessionSummary, TakeRecorder
 from sdt_tools.recording.session import derived_id, random_id
 from sdt_tools.recording.writer import RecordingWriter
 from sdt_tools.scene.scenario import layout_for
@@ -37,16 +36,6 @@ class SceneTakesConfig(SceneRecordingConfig):
     """
 
     keep_last_s: float | None = Field(default=None, gt=0)
-
-
-@dataclass(frozen=True)
-class SessionSummary:
-    """What a session's folder holds now, and why it ended; ``cut_off`` takes were never closed."""
-
-    folder: Path
-    ending: Ending
-    record: SessionRecord
-    cut_off: tuple[Path, ...]
 
 
 def record_scene_takes(

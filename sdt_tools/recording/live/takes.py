@@ -16,7 +16,7 @@ from sdt_tools.recording.live.interrupt import Interrupt
 from sdt_tools.recording.live.keep_last import KeepLast, Snapshot
 from sdt_tools.recording.live.latched import Latched
 from sdt_tools.recording.live.outcome import Ending, RecordingProgress
-from sdt_tools.recording.live.session_folder import SessionFolder
+from sdt_tools.recording.live.session_folder import SessionFolder, SessionRecord
 from sdt_tools.recording.live.sink import DirectSink, QueuedSink
 from sdt_tools.recording.live.take import Take, Tally
 from sdt_tools.recording.writer import RecordingWriter
@@ -25,6 +25,16 @@ _LISTEN_S: Final = 0.05
 
 OpenWriter = Callable[[Path, Mapping[str, str], int, bool], RecordingWriter]
 """Opens a file for a take: its path, notes for its metadata, its start, and whether it is written in real time."""
+
+
+@dataclass(frozen=True)
+class SessionSummary:
+    """What a session's folder holds now, and why it ended; ``cut_off`` takes were never closed."""
+
+    folder: Path
+    ending: Ending
+    record: SessionRecord
+    cut_off: tuple[Path, ...]
 
 
 @dataclass(frozen=True)

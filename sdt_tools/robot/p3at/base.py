@@ -4,6 +4,7 @@ import atexit
 import select
 import socket
 import threading
+from collections.abc import Callable
 from contextlib import suppress
 from time import monotonic_ns
 from typing import Final
@@ -31,6 +32,9 @@ _GIVES_UP_FACTOR: Final = 3
 _TRY_AGAIN_S: Final = 0.5
 _FAREWELL_S: Final = 1.0
 
+OnSent = Callable[[int, int], None]
+"""Told, in the thread of the base, when a command was given and when it was on the wire, by the host's clock."""
+
 
 class P3atBase:
     """A session with the base, kept up by a thread of its own. Implements Actuator.
@@ -46,7 +50,11 @@ class P3atBase:
     """
 
     def __init__(
-        self, config: P3atConfig, emergency: EmergencyStop | None = None, clock: HostClock | None = None
+        self,
+        config: P3atConfig,
+        emergency: EmergencyStop | None = None,
+        clock: HostClock | None = None,
+        on_sent: OnSent | None = None,
     ) -> None:
         self.emergency = EmergencyStop() if emergency is None else emergency
         self.status: Status | None = None
@@ -55,6 +63,8 @@ class P3atBase:
         self._clock = HostClock() if clock is None else clock
         self._arrivals = Arrivals(_ROOM)
         self._wheel = Wheel(config)
+        self._on_sent = on_sent
+        self._told_of_ns = 0
         self._closing = threading.Event()
         self._emergency_news = threading.Event()
         self._woken, self._wake = socket.socketpair()
@@ -80,7 +90,7 @@ class P3atBase:
 
     def command(self, twist: Twist) -> None:
         """Drive with ``twist``. Nothing happens while the base is lost or the emergency stop is pulled."""
-        self._wheel.command(twist, monotonic_ns())
+        self._wheel.command(twist, self._clock.now_ns())
         self._wake_up()
 
     def read(self, until_ns: int) -> list[Received | RawPicture]:
@@ -165,12 +175,16 @@ class P3atBase:
         return ""
 
     def _send(self) -> None:
-        if self._wheel.expires(monotonic_ns()):
+        commanded_ns = self._wheel.since_ns
+        if self._wheel.expires(self._clock.now_ns()):
             self._tell(LogLevel.WARNING, f"no command for {self._config.command_lasts_s:g} s: the base stops")
         if self.emergency.reason:  # whatever the wheel says: who frees it may not have heard yet
             self.session.link.write(b"".join((encode(Code.ESTOP), *STANDSTILL)))
         else:
             self.session.link.write(self._wheel.packets(self.status))
+        if self._on_sent is not None and commanded_ns != self._told_of_ns:
+            self._told_of_ns = commanded_ns
+            self._on_sent(commanded_ns, self._clock.now_ns())
 
     def _hear(self, data: bytes) -> None:
         bad = self.session.splitter.bad_checksums

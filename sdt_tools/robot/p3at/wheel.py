@@ -46,6 +46,11 @@ class Wheel:
                 self._wanted, self._since_ns = twist, now_ns
 
     @property
+    def since_ns(self) -> int:
+        """When the newest command that was taken was given; 0 before the first."""
+        return self._since_ns
+
+    @property
     def turns(self) -> bool:
         """Whether a motion is wanted."""
         return self._wanted != REST
