@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from sdt_tools.cli import drive_robot
 from sdt_tools.cli.console import JsonFlag, emit
 from sdt_tools.cli.endings import last_words
 from sdt_tools.cli.live import Live
@@ -34,6 +35,9 @@ app = typer.Typer(no_args_is_help=True, help="Drive with the whole controller: g
 @app.callback()
 def drive() -> None:
     """Drive with the whole controller: gestures switch it, a network follows."""
+
+
+app.command("robot", epilog=drive_robot.KEYS_HELP)(drive_robot.robot)
 
 
 @app.command("scene", epilog=KEYS_HELP)

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from collections.abc import Mapping
 
 _BAR: Final = 40
-_ENDINGS: Final = {"time": "its time was up", "source": "the scenario ended", "stopped": "you ended it"}
+ENDINGS: Final = {"time": "its time was up", "source": "the scenario ended", "stopped": "you ended it"}
 _STYLES: Final = {LogLevel.WARNING: "yellow", LogLevel.ERROR: "red"}
 
 
@@ -82,9 +82,9 @@ def drive_document(driven: SceneDrive, witness: Witness, record: Path | None) ->
         "wall_s": round(summary.wall_s, 3),
         "decisions": summary.decisions,
         "missed_deadlines": summary.missed_deadlines,
-        "scan_to_command": _latency(summary.latency),
-        "vision": _latency(_reading(witness.decisions)) | {"unreadable": driven.unreadable},
-        "switches": [_switch(one, driven.source.start_ns) for one in witness.decisions if one.switches],
+        "scan_to_command": latency_document(summary.latency),
+        "vision": latency_document(reading_latency(witness.decisions)) | {"unreadable": driven.unreadable},
+        "switches": [switch_document(one, driven.source.start_ns) for one in witness.decisions if one.switches],
         "mode_errors": len(tally.errors),
         "commands": tally.commands,
         "moot": tally.moot,
@@ -103,11 +103,11 @@ def print_drive(driven: SceneDrive, witness: Witness, record: Path | None) -> No
     late = f", {summary.missed_deadlines} deadlines missed" if summary.missed_deadlines else ""
     console.print(
         f"{summary.seconds:.1f} s in {summary.wall_s:.1f} s, {summary.decisions} decisions{late}; "
-        f"{_ENDINGS.get(summary.ending, summary.ending)}"
+        f"{ENDINGS.get(summary.ending, summary.ending)}"
     )
-    _histogram("from scan to command", summary.latency)
+    print_histogram("from scan to command", summary.latency)
     if witness.decisions:
-        _histogram("reading a picture", _reading(witness.decisions))
+        print_histogram("reading a picture", reading_latency(witness.decisions))
         reactions = ", ".join(f"{seconds:.2f} s" for seconds in tally.reactions_s)
         console.print(
             f"{tally.commands} commands, {len(tally.missed)} missed, {tally.moot} moot"
@@ -119,20 +119,23 @@ def print_drive(driven: SceneDrive, witness: Witness, record: Path | None) -> No
         console.print(f"recorded; look at it with: sdt view {record} --open", soft_wrap=True)
 
 
-def _reading(decisions: "list[VisionDecision]") -> Latency:
+def reading_latency(decisions: "list[VisionDecision]") -> Latency:
+    """How long pictures took to be read."""
     return latency_of([one.took_s for one in decisions])
 
 
-def _latency(latency: Latency) -> dict[str, object]:
+def latency_document(latency: Latency) -> dict[str, object]:
+    """Quantiles and histogram for machines."""
     bounds = [None if bound == float("inf") else bound for bound in BINS_MS]
     return {**vars(latency), "histogram": {"bounds_ms": bounds, "counts": list(latency.histogram)}}
 
 
-def _switch(one: VisionDecision, start_ns: int) -> dict[str, object]:
+def switch_document(one: VisionDecision, start_ns: int) -> dict[str, object]:
+    """A change of mode for machines."""
     return {"time_s": round((one.stamp_ns - start_ns) / SECOND_NS, 3), "mode": one.after.label}
 
 
-def _histogram(what: str, latency: Latency) -> None:
+def print_histogram(what: str, latency: Latency) -> None:
     """Quantiles, and a bar for each bin from the first to the last that holds any."""
     if latency.count == 0:
         return

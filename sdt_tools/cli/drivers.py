@@ -16,9 +16,30 @@ def make_driver(name: str, source: SceneSource, option: str = "--driver", forms:
 
     Raises UsageError for any other name or an unknown class, CheckpointError for a folder that holds no network.
     """
-    kind, _, rest = name.partition(":")
     if name == "expert":
         return ExpertDriver(source.expert)
+    driver = _that_sees(name)
+    if driver is None:
+        raise UsageError(f"{option} {name}: no such driver; choose {forms}")
+    return driver
+
+
+def make_robot_driver(name: str, option: str, forms: str) -> Driver:
+    """The driver called ``name`` (``constant:CLASS``, ``policy:MODEL_DIR``), for a robot.
+
+    Raises as ``make_driver``.
+    """
+    if name == "expert":
+        raise UsageError(f"{option} expert: the expert knows the scene's truth, and a robot has none; choose {forms}")
+    driver = _that_sees(name)
+    if driver is None:
+        raise UsageError(f"{option} {name}: no such driver; choose {forms}")
+    return driver
+
+
+def _that_sees(name: str) -> Driver | None:
+    """A driver that needs nothing but what sensors say."""
+    kind, _, rest = name.partition(":")
     if kind == "constant":
         return ConstantDriver(motion_labelled(rest))
     if kind == "policy" and rest:
@@ -26,4 +47,4 @@ def make_driver(name: str, source: SceneSource, option: str = "--driver", forms:
         from sdt_tools.models.checkpoint import load_checkpoint
 
         return PolicyDriver(load_checkpoint(Path(rest)))
-    raise UsageError(f"{option} {name}: no such driver; choose {forms}")
+    return None

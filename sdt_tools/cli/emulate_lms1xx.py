@@ -9,12 +9,11 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from sdt_tools.cli.console import JsonFlag, console, emit
+from sdt_tools.emulation.lms1xx.fault_kinds import FAULT_HELP
 from sdt_tools.errors import UsageError
 
 if TYPE_CHECKING:
-    from sdt_tools.emulation.lms1xx.emulator import EmulatedLms1xx
     from sdt_tools.emulation.lms1xx.supply import ScanSupply
-    from sdt_tools.emulation.lms1xx.troubles import Trouble
 
 
 class Protocol(Enum):
@@ -24,19 +23,7 @@ class Protocol(Enum):
     B = "b"
 
 
-class TroubleName(Enum):
-    """What ``--trouble`` takes."""
-
-    POWER = "power"
-    CABLE = "cable"
-    HANG_UP = "hang-up"
-    SILENCE = "silence"
-
-
-_FAULTS = "Faults of every scan"
-_TROUBLE = "Faults that come and go"
 _DEVICE = "The device"
-_SHARE = "Share of the scans, 0 to 1,"
 
 
 def lms1xx(
@@ -71,31 +58,7 @@ def lms1xx(
         int, typer.Option(min=0, help="What its clock shows first; it wraps at 4294967296.", rich_help_panel=_DEVICE)
     ] = 0,
     scale: Annotated[int, typer.Option(min=1, max=2, help="Millimetres a unit of range.", rich_help_panel=_DEVICE)] = 1,
-    split_bytes: Annotated[
-        int, typer.Option(min=0, help="Send in pieces of so many bytes.", rich_help_panel=_FAULTS)
-    ] = 0,
-    merge: Annotated[int, typer.Option(min=1, help="Send so many scans at once.", rich_help_panel=_FAULTS)] = 1,
-    delay_ms: Annotated[float, typer.Option(min=0, help="Send everything late.", rich_help_panel=_FAULTS)] = 0.0,
-    jitter_ms: Annotated[
-        float, typer.Option(min=0, help="Send late by a random part of this.", rich_help_panel=_FAULTS)
-    ] = 0.0,
-    drop: Annotated[float, typer.Option(min=0, max=1, help=f"{_SHARE} not sent.", rich_help_panel=_FAULTS)] = 0.0,
-    spoil: Annotated[
-        float,
-        typer.Option(min=0, max=1, help=f"{_SHARE} with a wrong checksum; in CoLa-A cut off.", rich_help_panel=_FAULTS),
-    ] = 0.0,
-    garbage: Annotated[
-        float, typer.Option(min=0, max=1, help=f"{_SHARE} behind random bytes.", rich_help_panel=_FAULTS)
-    ] = 0.0,
-    drift_ppm: Annotated[float, typer.Option(help="Let its clock run too fast.", rich_help_panel=_FAULTS)] = 0.0,
-    trouble: Annotated[
-        TroubleName | None,
-        typer.Option(help="Switch it off, pull its cable, hang up, or send no scans.", rich_help_panel=_TROUBLE),
-    ] = None,
-    every_s: Annotated[
-        float, typer.Option(min=0.1, help="How long it goes well in between.", rich_help_panel=_TROUBLE)
-    ] = 20.0,
-    lasting_s: Annotated[float, typer.Option(min=0, help="How long it lasts.", rich_help_panel=_TROUBLE)] = 3.0,
+    fault: Annotated[list[str] | None, typer.Option(metavar="FAULT", help=FAULT_HELP)] = None,
     json_output: JsonFlag = False,
 ) -> None:
     """Be a SICK LMS1xx: a TCP server with its commands, states, counters and clock, that serves a scene or a recording.
@@ -103,10 +66,12 @@ def lms1xx(
     Ctrl-C ends it, and prints what was sent and which faults there were.
     """
     from sdt_tools.config import parse_config
+    from sdt_tools.emulation.faults import parse_fault
     from sdt_tools.emulation.lms1xx.config import EmulatedConfig
     from sdt_tools.emulation.lms1xx.emulator import EmulatedLms1xx
+    from sdt_tools.emulation.lms1xx.fault_kinds import KINDS
     from sdt_tools.emulation.lms1xx.faults import Faults
-    from sdt_tools.emulation.lms1xx.troubles import Trouble
+    from sdt_tools.emulation.lms1xx.plan import FaultPlan
 
     device = {
         "host": host,
@@ -121,27 +86,16 @@ def lms1xx(
         "start_us": start_us,
         "scale": scale,
     }
-    faults = {
-        "split_bytes": split_bytes,
-        "merge": merge,
-        "delay_ms": delay_ms,
-        "jitter_ms": jitter_ms,
-        "drop": drop,
-        "spoil": spoil,
-        "garbage": garbage,
-        "drift_ppm": drift_ppm,
-        "seed": seed,
-    }
     named = {"scan_hz": "--hz", "resolution_deg": "--resolution"}
-    options = {name: named.get(name, f"--{name.replace('_', '-')}") for name in (*device, *faults)}
+    options = {name: named.get(name, f"--{name.replace('_', '-')}") for name in device}
     config = parse_config(EmulatedConfig, device, "robot emulate lms1xx", options)
-    wrong = parse_config(Faults, faults, "robot emulate lms1xx", options)
+    planned = tuple(parse_fault(text, KINDS) for text in fault or ())
     supply = _supply(scene, recording, seed)
-    with EmulatedLms1xx(supply, config, wrong) as emulator:
+    with EmulatedLms1xx(supply, config, Faults(seed=seed)) as emulator, FaultPlan(emulator, planned, seed):
         source = recording or f"scenario {scene or 'plain'}"
         served = f"{source} at {host}:{emulator.port}, {emulator.device.dialect.label}"
         console.print(f"LMS1xx with {served}; Ctrl-C ends it", soft_wrap=True)
-        _serve(emulator, None if trouble is None else Trouble(trouble.value), every_s, lasting_s, seconds)
+        serve(seconds)
         counts = asdict(emulator.counts)
     if json_output:
         emit(counts)
@@ -157,25 +111,14 @@ def _supply(scene: str | None, recording: Path | None, seed: int) -> "ScanSupply
     return SceneScans(scene or "plain", seed) if recording is None else RecordedScans(recording)
 
 
-def _serve(
-    emulator: "EmulatedLms1xx", trouble: "Trouble | None", every_s: float, lasting_s: float, seconds: float | None
-) -> None:
-    """Let it serve until its time is up, or a signal comes."""
+def serve(seconds: float | None) -> None:
+    """Wait until the time is up, or a signal comes."""
     from threading import Event
-    from time import monotonic
-
-    from sdt_tools.emulation.lms1xx.troubles import make_trouble
 
     ending = Event()
-    end_s = float("inf") if seconds is None else monotonic() + seconds
     before = {number: signal.signal(number, lambda *_: ending.set()) for number in (signal.SIGINT, signal.SIGTERM)}
     try:
-        while (left_s := end_s - monotonic()) > 0 and not ending.is_set():
-            if trouble is None:
-                ending.wait(min(left_s, 3600.0))
-            elif not ending.wait(min(left_s, every_s)) and monotonic() < end_s:
-                console.print(f"trouble: {trouble.value}")
-                make_trouble(emulator, trouble, lasting_s, ending)
+        ending.wait(seconds)
     finally:
         for number, handler in before.items():
             signal.signal(number, handler)

@@ -26,13 +26,14 @@ def p3at(
     """
     from dataclasses import replace
 
-    from sdt_tools.emulation.p3at.faults import parse_fault
+    from sdt_tools.emulation.faults import parse_fault
+    from sdt_tools.emulation.p3at.faults import KINDS
     from sdt_tools.emulation.p3at.firmware import FACTORY
     from sdt_tools.emulation.p3at.ports import PtyPort, TcpPort
     from sdt_tools.emulation.p3at.server import EmulatedP3at
     from sdt_tools.recording.live.interrupt import deferred_interrupt
 
-    planned = tuple(parse_fault(text) for text in fault or ())
+    planned = tuple(parse_fault(text, KINDS) for text in fault or ())
     settings = replace(FACTORY, watchdog_ms=watchdog_ms)
     place = PtyPort() if pty else TcpPort(host, port)
     with deferred_interrupt() as interrupt, EmulatedP3at(place, planned, settings=settings, seed=seed) as base:

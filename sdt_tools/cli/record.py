@@ -1,25 +1,21 @@
 """``sdt record``: recordings."""
 
-import re
 from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from sdt_tools.cli.console import JsonFlag, console, emit
+from sdt_tools.cli import record_robot
+from sdt_tools.cli.console import JsonFlag, emit
 from sdt_tools.cli.endings import last_words
 from sdt_tools.cli.live import Live
+from sdt_tools.cli.record_report import KEYS_HELP, print_recording, recording_document, seconds_of
 from sdt_tools.errors import OutputExistsError, UsageError
 
 if TYPE_CHECKING:
     from sdt_tools.recording.live.outcome import RecordingSummary
     from sdt_tools.recording.live.scene_session import SceneRecordingConfig
-
-KEYS_HELP = (
-    "Keys with --session at a terminal: space pauses and resumes, n ends the take and starts the next, k keeps it and "
-    "stops, x discards it (or the last one) to the trash, m marks the moment, s saves what --keep-last holds, q quits."
-)
 
 _OPTIONS = {name: f"--{name}" for name in ("scenario", "seed", "seconds", "driver")} | {"keep_last_s": "--keep-last"}
 """Options that stand for a setting, by its name."""
@@ -30,6 +26,9 @@ app = typer.Typer(no_args_is_help=True, help="Record scans, images, poses and co
 @app.callback()
 def record() -> None:
     """Record scans, images, poses and commands in step into one MCAP file."""
+
+
+app.command("robot", epilog=KEYS_HELP)(record_robot.robot)
 
 
 @app.command("scene", epilog=KEYS_HELP)
@@ -116,9 +115,9 @@ def scene(
     summary = _record_one(recording, out, how)
     with last_words(summary.ending):
         if json_output:
-            emit(_document(out, summary))
+            emit(recording_document(out, summary))
         else:
-            _print(out, summary)
+            print_recording(out, summary)
 
 
 def _record_one(config: "SceneRecordingConfig", out: Path, how: Live) -> "RecordingSummary":
@@ -165,55 +164,3 @@ def _scene_session(
             emit(session_document(summary))
         else:
             print_session(summary)
-
-
-def seconds_of(text: str) -> float:
-    """The seconds in ``30s``, ``2min`` or ``30``. Raises UsageError for anything else."""
-    found = re.fullmatch(r"(\d+(?:\.\d+)?)\s*(s|min)?", text.strip())
-    seconds = float(found[1]) * (60 if found[2] == "min" else 1) if found else 0.0
-    if seconds <= 0:
-        raise UsageError(f"--keep-last {text}: no length of time; write it as 30s or 2min")
-    return seconds
-
-
-def _document(out: Path, summary: "RecordingSummary") -> dict[str, object]:
-    return {
-        "out": str(out),
-        "recording_id": summary.recording_id,
-        "seconds": summary.seconds,
-        "wall_s": round(summary.wall_s, 3),
-        "real_time_factor": round(summary.real_time_factor, 2),
-        "ending": summary.ending,
-        "interrupted": summary.interrupted,
-        "frames": dict(summary.frames),
-        "dropped": dict(summary.dropped),
-        "missing": dict(summary.missing),
-        "missed_deadlines": summary.missed_deadlines,
-        "decisions": summary.decisions,
-        "forced_decisions": summary.forced,
-        "size_bytes": summary.size_bytes,
-    }
-
-
-def _print(out: Path, summary: "RecordingSummary") -> None:
-    from rich.table import Table
-
-    table = Table("topic", "messages", "per second", "dropped", "missing")
-    for topic, count in summary.frames.items():
-        rate = f"{count / summary.seconds:.1f}" if summary.seconds > 0 else ""
-        lost = (str(summary.dropped.get(topic, "")), str(summary.missing.get(topic, "")))
-        table.add_row(topic, str(count), rate, *lost)
-    console.print(table)
-    ending = {
-        "time": "",
-        "source": "; the scenario ended",
-        "interrupted": "; you stopped it, the file is whole",
-        "terminated": "; SIGTERM stopped it, the file is whole",
-        "hangup": "; its terminal hung up, the file is whole",
-        "disk": "; its disk is nearly full: it was ended while there was room for a whole file",
-    }.get(summary.ending, "")
-    late = f", {summary.missed_deadlines} deadlines missed" if summary.missed_deadlines else ""
-    console.print(
-        f"{out}: {summary.seconds:.1f} s in {summary.wall_s:.1f} s ({summary.real_time_factor:.0f} times real time), "
-        f"{summary.size_bytes / 1e6:.1f} MB{late}{ending}"
-    )

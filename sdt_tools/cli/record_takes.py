@@ -12,7 +12,8 @@ from sdt_tools.cli.live import Live
 if TYPE_CHECKING:
     from sdt_tools.protocols import Observer
     from sdt_tools.recording.live.control import Control
-    from sdt_tools.recording.live.scene_takes import SceneTakesConfig, SessionSummary
+    from sdt_tools.recording.live.scene_takes import SceneTakesConfig
+    from sdt_tools.recording.live.takes import SessionSummary
 
 _WISHES: Final = {
     " ": "toggle",
@@ -41,7 +42,7 @@ def record_takes(config: "SceneTakesConfig", folder: Path, resume: bool, how: Li
     try:
         if how.seated:
             return _drive_takes(config, folder, resume, how, observers)
-        with _control() as control, recording_progress(f"session {folder.name}") as progress:
+        with takes_control() as control, recording_progress(f"session {folder.name}") as progress:
             return record_scene_takes(config, folder, make_driver, resume, control, observers, progress)
     except ChangedConfigError as error:
         for line in error.differences:
@@ -74,7 +75,8 @@ def _drive_takes(
 
 
 @contextmanager
-def _control() -> Iterator["Control | None"]:
+def takes_control() -> Iterator["Control | None"]:
+    """What keys want of the takes, where somebody is there to press them."""
     from sdt_tools.cli.keys import at_a_terminal, pressed_keys
     from sdt_tools.recording.live.control import Control, Wish
 

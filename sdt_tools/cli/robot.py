@@ -2,13 +2,14 @@
 
 import typer
 
-from sdt_tools.cli import emulate_lms1xx, emulate_p3at
+from sdt_tools.cli import emulate_lms1xx, emulate_p3at, emulate_robot
 
 app = typer.Typer(no_args_is_help=True, help="The robot's devices, and emulated ones in their place.")
-emulate = typer.Typer(no_args_is_help=True, help="Be one of the robot's devices, with faults on demand.")
+emulate = typer.Typer(no_args_is_help=True, help="Be the robot or one of its devices, with faults on demand.")
 app.add_typer(emulate, name="emulate")
 emulate.command("lms1xx")(emulate_lms1xx.lms1xx)
 emulate.command("p3at")(emulate_p3at.p3at)
+emulate.command("robot", epilog=emulate_robot.KEYS_HELP)(emulate_robot.whole_robot)
 
 
 @app.callback()
@@ -18,4 +19,4 @@ def robot() -> None:
 
 @emulate.callback()
 def emulated() -> None:
-    """Be one of the robot's devices, with faults on demand."""
+    """Be the robot or one of its devices, with faults on demand."""

@@ -21,7 +21,7 @@ SDT = [sys.executable, "-c", "from sdt_tools.cli.app import main; main()", "robo
 
 
 def test_a_recording_is_served_until_ctrl_c_and_what_was_done_is_told() -> None:
-    command = [*SDT, "--port", "0", "--recording", str(SAMPLE), "--protocol", "b", "--drop", "0.1", "--json"]
+    command = [*SDT, "--port", "0", "--recording", str(SAMPLE), "--protocol", "b", "--fault", "drop=0.1", "--json"]
     emulator = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
     try:
         assert emulator.stderr is not None

@@ -33,7 +33,7 @@ def test_a_base_is_played_until_ctrl_c_and_tells_how_it_fared() -> None:
 @pytest.mark.parametrize(
     ("words", "said"),
     [
-        (["--fault", "fire"], "fault 'fire': write KIND[=VALUE][@FROM[-TO]]"),
+        (["--fault", "fire"], "fault 'fire': write KIND[=VALUE][@FROM[-TO[/EVERY]]]"),
         (["--host", "192.0.2.1"], "192.0.2.1:8101 cannot be listened on"),
     ],
 )

@@ -114,6 +114,12 @@ class EmulatedLms1xx:
         return self._port
 
     @property
+    def streams(self) -> bool:
+        """Whether a client has scans sent to it."""
+        with self._lock:
+            return any(client.session.streams for client in self._clients)
+
+    @property
     def faults(self) -> Faults:
         """Those of the moment."""
         return self._faults

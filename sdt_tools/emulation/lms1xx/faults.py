@@ -1,8 +1,10 @@
-"""What can go wrong between a LiDAR and its host, on demand."""
+"""What can go wrong with a LiDAR, and between it and its host, on demand."""
 
 from pydantic import Field
 
 from sdt_tools.config import Config
+from sdt_tools.emulation import faults
+from sdt_tools.emulation.lms1xx.fault_kinds import LidarFault
 
 
 class Faults(Config):
@@ -23,3 +25,22 @@ class Faults(Config):
     garbage: float = Field(default=0.0, ge=0, le=1)
     drift_ppm: float = Field(default=0.0, ge=-10_000, le=10_000)
     seed: int = Field(default=0, ge=0)
+
+
+def faults_at(planned: faults.Faults, at_s: float, seed: int) -> Faults:
+    """What is wrong with what is sent at that moment."""
+
+    def value(kind: LidarFault) -> float:
+        return planned.value(kind, at_s) or 0.0
+
+    return Faults(
+        split_bytes=int(value(LidarFault.SPLIT)),
+        merge=max(int(value(LidarFault.MERGE)), 1),
+        delay_ms=1e3 * value(LidarFault.DELAY),
+        jitter_ms=1e3 * value(LidarFault.JITTER),
+        drop=value(LidarFault.DROP),
+        spoil=value(LidarFault.CORRUPT),
+        garbage=value(LidarFault.GARBAGE),
+        drift_ppm=value(LidarFault.DRIFT),
+        seed=seed,
+    )

@@ -7,8 +7,9 @@ import math
 from typing import Final
 
 from sdt_tools.clock import SECOND_NS
+from sdt_tools.emulation.faults import Faults
 from sdt_tools.emulation.p3at.body import Body, FreeBody
-from sdt_tools.emulation.p3at.faults import FaultKind, Faults
+from sdt_tools.emulation.p3at.faults import FaultKind
 from sdt_tools.emulation.p3at.motors import REST, Motors
 from sdt_tools.frames import Twist
 from sdt_tools.robot.p3at.commands import Code, Command, decode, wheels_of

@@ -8,8 +8,9 @@ from time import monotonic_ns
 from typing import Final
 
 from sdt_tools.clock import SECOND_NS
+from sdt_tools.emulation.faults import Fault, Faults
 from sdt_tools.emulation.p3at.body import Body
-from sdt_tools.emulation.p3at.faults import Fault, FaultKind, Faults
+from sdt_tools.emulation.p3at.faults import FaultKind
 from sdt_tools.emulation.p3at.firmware import FACTORY, Firmware
 from sdt_tools.emulation.p3at.ports import Port
 from sdt_tools.emulation.p3at.wire import FaultyWire

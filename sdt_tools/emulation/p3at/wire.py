@@ -6,7 +6,8 @@ from collections.abc import Iterator
 from typing import Final
 
 from sdt_tools.clock import SECOND_NS
-from sdt_tools.emulation.p3at.faults import FaultKind, Faults
+from sdt_tools.emulation.faults import Faults
+from sdt_tools.emulation.p3at.faults import FaultKind
 
 _PIECE_NS: Final = 2_000_000
 """Time between the pieces of a packet that is split: enough for each to be a read of its own."""

@@ -2,7 +2,8 @@
 
 import pytest
 
-from sdt_tools.emulation.p3at.faults import Fault, FaultKind, Faults, parse_fault
+from sdt_tools.emulation.faults import Fault, Faults, parse_fault
+from sdt_tools.emulation.p3at.faults import KINDS, FaultKind
 from sdt_tools.emulation.p3at.wire import FaultyWire
 from sdt_tools.errors import UsageError
 from sdt_tools.robot.p3at.packets import PacketSplitter, packet
@@ -18,10 +19,11 @@ PACKETS = [packet(bytes([0x32, number])) for number in range(100)]
         ("power@5-7.5", Fault(FaultKind.POWER, 1.0, 5.0, 7.5)),
         ("battery@30", Fault(FaultKind.BATTERY, 11.0, 30.0)),
         ("split=2@1-2", Fault(FaultKind.SPLIT, 2.0, 1.0, 2.0)),
+        ("power@5-7/20", Fault(FaultKind.POWER, 1.0, 5.0, 7.0, 20.0)),
     ],
 )
 def test_faults_as_they_are_written(text: str, fault: Fault) -> None:
-    assert parse_fault(text) == fault
+    assert parse_fault(text, KINDS) == fault
 
 
 @pytest.mark.parametrize(
@@ -33,17 +35,24 @@ def test_faults_as_they_are_written(text: str, fault: Fault) -> None:
         ("merge=0", "a count, from 1 on"),
         ("power=3", "power takes no value"),
         ("stall@3-2", "it ends before it begins"),
+        ("stall@3-5/2", "it comes again before it has ended"),
+        ("battery=-3", "the value is not below 0"),
     ],
 )
 def test_faults_that_are_none(text: str, words: str) -> None:
     with pytest.raises(UsageError, match=words) as refused:
-        parse_fault(text)
+        parse_fault(text, KINDS)
     assert f"'{text}'" in str(refused.value)
 
 
 def test_a_planned_fault_holds_for_its_time() -> None:
     faults = Faults((Fault(FaultKind.STALL, 1.0, 2.0, 3.0),))
     assert [faults.value(FaultKind.STALL, at_s) for at_s in (1.9, 2.0, 2.9, 3.0)] == [None, 1.0, 1.0, None]
+
+
+def test_a_fault_comes_again() -> None:
+    fault = parse_fault("stall@2-3/10", KINDS)
+    assert [fault.holds(at_s) for at_s in (1.9, 2.0, 3.0, 11.9, 12.0, 12.9, 13.0)] == [0, 1, 0, 0, 1, 1, 0]
 
 
 def through(kind: FaultKind, value: float) -> list[bytes]:

@@ -4,7 +4,8 @@ import math
 
 import pytest
 
-from sdt_tools.emulation.p3at.faults import FaultKind, Faults
+from sdt_tools.emulation.faults import Faults
+from sdt_tools.emulation.p3at.faults import FaultKind
 from sdt_tools.emulation.p3at.firmware import Firmware
 from sdt_tools.frames import Twist
 from sdt_tools.robot.p3at.commands import Code, encode, wheels_argument

@@ -6,7 +6,7 @@ from contextlib import contextmanager
 from dataclasses import replace
 from typing import Final
 
-from sdt_tools.emulation.p3at.faults import Fault
+from sdt_tools.emulation.faults import Fault
 from sdt_tools.emulation.p3at.firmware import FACTORY
 from sdt_tools.emulation.p3at.ports import Port, PtyPort, TcpPort
 from sdt_tools.emulation.p3at.server import EmulatedP3at
