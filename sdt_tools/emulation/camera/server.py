@@ -8,16 +8,11 @@ from random import Random
 from time import monotonic
 from typing import Final, Protocol, runtime_checkable
 
-import cv2
-from jaxtyping import UInt8
-from numpy import ndarray
-
 from sdt_tools.clock import SECOND_NS, HostClock, Pacer
 from sdt_tools.emulation.camera.faults import CameraFault
 from sdt_tools.emulation.faults import Fault, Faults
 from sdt_tools.errors import DeviceError
 
-_QUALITY: Final = 80
 _WAIT_S: Final = 0.1
 _END_S: Final = 2.0
 
@@ -26,8 +21,8 @@ _END_S: Final = 2.0
 class PictureSupply(Protocol):
     """What a camera sees, whenever it is asked."""
 
-    def picture_at(self, host_ns: int) -> UInt8[ndarray, "height width 3"]:
-        """The picture at ``host_ns``, which never goes back; blue, green, red."""
+    def jpeg_at(self, host_ns: int) -> bytes:
+        """The picture at ``host_ns``, which never goes back, as a JPEG file."""
         ...
 
 
@@ -144,8 +139,7 @@ class EmulatedCamera:
             self._hand_out()
 
     def _take(self, now_ns: int) -> None:
-        picture = self._supply.picture_at(now_ns)
-        data = cv2.imencode(".jpg", picture, [cv2.IMWRITE_JPEG_QUALITY, _QUALITY])[1].tobytes()
+        data = self._supply.jpeg_at(now_ns)
         if self._random.random() < (self._value(CameraFault.CORRUPT) or 0.0):
             data = data[: len(data) // 2]
         self._late.append((monotonic() + (self._value(CameraFault.DELAY) or 0.0), data))

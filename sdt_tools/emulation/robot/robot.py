@@ -65,7 +65,10 @@ def parse_device_faults(texts: Sequence[str]) -> DeviceFaults:
 
 
 class EmulatedRobot:
-    """LiDAR, base and camera in ``world``, until ``close``. Raises DeviceError, UsageError where a port is taken."""
+    """LiDAR, base and camera in ``world``, which is closed with them, until ``close``.
+
+    Raises DeviceError, UsageError where a port is taken.
+    """
 
     def __init__(
         self,
@@ -79,6 +82,7 @@ class EmulatedRobot:
         self.world = world
         self._host = places.host
         with ExitStack() as opened:
+            opened.callback(world.close)
             device = EmulatedConfig(host=places.host, port=places.lidar_port, protocol=places.protocol)  # type: ignore[arg-type] # checked there
             self.lidar = opened.enter_context(EmulatedLms1xx(world, device, Faults(seed=seed), clock))
             self.lidar_faults = opened.enter_context(FaultPlan(self.lidar, faults.lidar, seed)).faults

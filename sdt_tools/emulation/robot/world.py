@@ -6,12 +6,12 @@ from dataclasses import replace
 from typing import Final
 
 import numpy as np
-from jaxtyping import Float64, UInt8
+from jaxtyping import Float64
 
-from sdt_tools.clock import FAST_EPOCH_NS, HostClock
+from sdt_tools.clock import FAST_EPOCH_NS, SECOND_NS, HostClock
+from sdt_tools.emulation.robot.studio import Shot, Studio
 from sdt_tools.frames import Gesture, LidarScan, Pose2D, Received, Twist
 from sdt_tools.protocols import Observer
-from sdt_tools.scene.camera import SceneCamera
 from sdt_tools.scene.config import SceneConfig
 from sdt_tools.scene.film import between
 from sdt_tools.scene.gestures import arms_at
@@ -25,9 +25,9 @@ _FOR_EVER_S: Final = 1e9
 class EmulatedWorld:
     """The world of ``layout`` in the host's time, from ``begin`` on; until then it stands still.
 
-    Implements ScanSupply, Body and PictureSupply, each for a thread of its own. Unlike a scenario it has no end: the
-    operator stays where his path has ended, and what the robot touches holds it up. ``observers`` see its messages, the
-    truth among them, in the thread that moves it on; they must be quick.
+    Implements ScanSupply, Body and PictureSupply, each for a thread of its own; ``close`` it. Unlike a scenario it has
+    no end: the operator stays where his path has ended, and what the robot touches holds it up. ``observers`` see its
+    messages, the truth among them, in the thread that moves it on; they must be quick.
     """
 
     def __init__(
@@ -38,16 +38,14 @@ class EmulatedWorld:
             replace(layout, timeout_s=_FOR_EVER_S), (config or SceneConfig()).model_copy(update=endless)
         )
         self._clock = HostClock() if clock is None else clock
-        self._camera = SceneCamera(layout) if camera else None
+        self._studio = Studio(layout) if camera else None
         self._frame = 0
         self._observers: tuple[Observer, ...] = ()
         self._lock = threading.Lock()
         self._began_ns: int | None = None
         self._ranges_m: Float64[np.ndarray, "rays"] = np.zeros(0)
-        self._before = (self._scene.world.robot, self._scene.world.operator)
+        self._now = self._before = (0, self._scene.world.robot, self._scene.world.operator)
         self._read(FAST_EPOCH_NS)
-        if self._camera is not None:
-            self.picture_at(0)  # compiled now, and not when somebody waits for it
 
     @property
     def world(self) -> World:
@@ -87,22 +85,22 @@ class EmulatedWorld:
             self._advance(host_ns)
             return self._ranges_m
 
-    def picture_at(self, host_ns: int) -> UInt8[np.ndarray, "height width 3"]:
-        """What the camera sees then, from between the world's last two steps."""
-        assert self._camera is not None
+    def jpeg_at(self, host_ns: int) -> bytes:
+        """What the camera sees a step of the world before that time, which lies between two steps that are known."""
+        assert self._studio is not None
         with self._lock:
             self._advance(host_ns)
             world = self._scene.world
-            robot_before, operator_before = self._before
-            robot, operator = world.robot, world.operator
-            time_s, gait = world.time_s, (world.gait_phase, world.gait_amplitude)
-            if self._began_ns is not None:
-                time_s = min(max((host_ns - self._began_ns) / 1e9, time_s - STEP_S), time_s + STEP_S)
+            (steps_before, robot_before, operator_before), (steps, robot, operator) = self._before, self._now
+            gait = (world.gait_phase, world.gait_amplitude)
+            since_s = 0.0 if self._began_ns is None else (host_ns - self._began_ns) / SECOND_NS - STEP_S
             gestures = tuple(world.gestures)
-        share = min(max((time_s - world.time_s) / STEP_S, 0.0), 1.0)
+        first_s, last_s = steps_before * STEP_S, steps * STEP_S
+        time_s = min(max(since_s, first_s), last_s)  # a step behind, so that it lies between two that are known
+        share = 1.0 if last_s == first_s else (time_s - first_s) / (last_s - first_s)
         arms = arms_at(gestures, world.layout.behaviours, time_s)
         self._frame += 1
-        return self._camera.render(
+        shot = Shot(
             between(robot_before, robot, share),
             between(operator_before, operator, share),
             *gait,
@@ -112,6 +110,12 @@ class EmulatedWorld:
             self._frame,
             arms.manner,
         )
+        return self._studio.jpeg(shot)
+
+    def close(self) -> None:
+        """Render no more. May be called twice."""
+        if self._studio is not None:
+            self._studio.close()
 
     def _advance(self, host_ns: int) -> None:
         if self._began_ns is not None:
@@ -119,13 +123,11 @@ class EmulatedWorld:
 
     def _read(self, until_ns: int) -> None:
         world = self._scene.world
-        before = (world.robot, world.operator)
-        steps = world.steps
         for sensed in self._scene.read(until_ns):
             if isinstance(sensed, Received):
                 if isinstance(sensed.message, LidarScan):
                     self._ranges_m = sensed.message.ranges_m
                 for observer in self._observers:
                     observer.observe(sensed)
-        if world.steps > steps:
-            self._before = before
+        if self._now[0] != world.steps:
+            self._before, self._now = self._now, (world.steps, world.robot, world.operator)
