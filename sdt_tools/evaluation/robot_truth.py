@@ -22,6 +22,7 @@ class RobotTruth:
         self._world = world
         self._judge = Judge(timeout_s, config or SuccessConfig())
         self._scans = 0
+        situation_in(world)  # what it needs is compiled now: the world does not wait for it
 
     def observe(self, received: Received) -> None:
         """Look at every fifth scan's moment."""

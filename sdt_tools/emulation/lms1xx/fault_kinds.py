@@ -24,14 +24,14 @@ class LidarFault(StrEnum):
 
 
 _VALUES: Final = {
-    LidarFault.SPLIT: Value(100, is_count=True),
-    LidarFault.MERGE: Value(3, is_count=True),
+    LidarFault.SPLIT: Value(100.0, is_count=True),
+    LidarFault.MERGE: Value(3.0, is_count=True),
     LidarFault.DELAY: Value(0.02),
     LidarFault.JITTER: Value(0.005),
     LidarFault.DROP: Value(0.1, is_share=True),
     LidarFault.CORRUPT: Value(0.1, is_share=True),
     LidarFault.GARBAGE: Value(0.1, is_share=True),
-    LidarFault.DRIFT: Value(50, is_signed=True),
+    LidarFault.DRIFT: Value(50.0, is_signed=True),
 }
 KINDS: Final[Kinds] = {kind: _VALUES.get(kind) for kind in LidarFault}
 FAULTS: Final = (

@@ -24,8 +24,8 @@ class FaultKind(StrEnum):
 
 
 _VALUES: Final = {
-    FaultKind.SPLIT: Value(3, is_count=True),
-    FaultKind.MERGE: Value(2, is_count=True),
+    FaultKind.SPLIT: Value(3.0, is_count=True),
+    FaultKind.MERGE: Value(2.0, is_count=True),
     FaultKind.DELAY: Value(0.1),
     FaultKind.DROP: Value(0.1, is_share=True),
     FaultKind.CORRUPT: Value(0.1, is_share=True),

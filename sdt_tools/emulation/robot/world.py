@@ -34,9 +34,10 @@ class EmulatedWorld:
         self, layout: Layout, config: SceneConfig | None = None, clock: HostClock | None = None, camera: bool = True
     ) -> None:
         endless = {"linger_s": _FOR_EVER_S, "stop_at_contact": False}
-        self._scene = SceneSource(
-            replace(layout, timeout_s=_FOR_EVER_S), (config or SceneConfig()).model_copy(update=endless)
-        )
+        settings = (config or SceneConfig()).model_copy(update=endless)
+        for _ in SceneSource(layout, settings).read(FAST_EPOCH_NS + SECOND_NS):
+            pass  # what a world needs is compiled before anybody waits for it
+        self._scene = SceneSource(replace(layout, timeout_s=_FOR_EVER_S), settings)
         self._clock = HostClock() if clock is None else clock
         self._studio = Studio(layout) if camera else None
         self._frame = 0
