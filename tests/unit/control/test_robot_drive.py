@@ -19,13 +19,22 @@ from sdt_tools.control.robot.takes import RobotTakesConfig, open_session, record
 from sdt_tools.emulation.lms1xx.fault_kinds import LidarFault
 from sdt_tools.emulation.robot.robot import EmulatedRobot
 from sdt_tools.errors import ConfigError, DeviceError
-from sdt_tools.frames import CameraCalibration, FrameTransform, LidarScan, LogEntry, MotionClass, MotionCommand, Odometry
+from sdt_tools.frames import (
+    CameraCalibration,
+    FrameTransform,
+    LidarScan,
+    LogEntry,
+    MotionClass,
+    MotionCommand,
+    Odometry,
+)
 from sdt_tools.recording.live.drivers import ConstantDriver
 from sdt_tools.recording.live.outcome import Ending
 from sdt_tools.recording.reader import Recording
 from sdt_tools.robot.camera.config import CameraConfig
 
 SOON_S = 0.3
+OWN_PASSWORD = "0BADF00D"  # noqa: S105 - the hash of none
 
 
 @pytest.fixture(scope="module")
@@ -138,22 +147,22 @@ def test_nobody_drives_a_robot_that_is_only_recorded(robot: EmulatedRobot, tmp_p
 
 def test_takes_lie_in_a_session_whose_password_is_kept_out(robot: EmulatedRobot, tmp_path: Path) -> None:
     values = robot_file(robot).model_dump(exclude_none=True)
-    values["lidar"]["password"] = "0BADF00D"
+    values["lidar"]["password"] = OWN_PASSWORD
     config = RobotTakesConfig(seconds=0.3, driver="test", robot=RobotFile.model_validate(values))
     session = open_session(config, tmp_path / "monday", resume=False)
     with open_robot(config.robot) as opened:
         summary = record_robot_takes(config, opened, session, ConstantDriver(MotionClass.STAY))
     (take,) = summary.record.takes
     assert (take.ending, take.name) == ("time", "take_001.mcap")
-    assert "0BADF00D" not in (tmp_path / "monday/session.toml").read_text()
+    assert OWN_PASSWORD not in (tmp_path / "monday/session.toml").read_text()
     with Recording.open(tmp_path / "monday" / take.name) as recording:
-        assert "0BADF00D" not in recording.config_toml
+        assert OWN_PASSWORD not in recording.config_toml
 
 
 def test_a_device_that_is_missing_leaves_none_open(robot: EmulatedRobot) -> None:
     values = robot_file(robot).model_dump(exclude_none=True)
     values["lidar"]["port"] = 1
-    with pytest.raises(DeviceError, match="LiDAR at 127.0.0.1:1"), open_robot(RobotFile.model_validate(values)):
+    with pytest.raises(DeviceError, match=r"LiDAR at 127\.0\.0\.1:1"), open_robot(RobotFile.model_validate(values)):
         pass
     with open_robot(robot_file(robot)):
         pass  # the base, which takes one client at a time, is free again
