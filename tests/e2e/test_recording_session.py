@@ -182,6 +182,8 @@ def test_what_led_to_a_change_of_mode_is_kept_without_a_terminal_too(tmp_path: P
         (["--out", "x.mcap", "--resume"], "--resume needs --session"),
         (["--out", "x.mcap", "--keep-last", "30s"], "--keep-last needs --session"),
         (["--session", "s", "--keep-last", "soon"], "--keep-last soon: no length of time; write it as 30s or 2min"),
+        (["--session", "s", "--driver", "policy:nowhere"], "nowhere"),
+        (["--session", "s", "--scenario", "nowhere"], "nowhere"),
         (["--session", "s", "--resume"], "s: no session to resume; leave --resume out to begin one"),
     ],
 )

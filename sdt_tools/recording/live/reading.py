@@ -13,8 +13,14 @@ from sdt_tools.protocols import Source
 
 SILENT_S: Final = 0.2
 """A source that has not come back from ``read`` for so long is silent: nobody knows what is before the robot."""
+TOILING_S: Final = 1.0
+"""It may take so long where it computes, as a scene does: on a machine that has no time for it nothing moves there."""
 DEAD_S: Final = 5.0
 """One that has been silent for so long is not waited for any more."""
+_SLICE_S: Final = 0.02
+"""Waiting is counted in slices: where this process gets no processor at all, the source is not to blame."""
+_IDLE_NS: Final = 2_000_000
+"""Processor time that a source which hangs does not take in ``SILENT_S``."""
 _CLOSE_S: Final = 1.0
 
 
@@ -80,7 +86,7 @@ class DirectReading:
 
 
 class WatchedReading:
-    """Reads in a thread of its own, and waits for it no longer than ``silent_after_s``.
+    """Reads in a thread of its own, and waits for it no longer than ``silent_after_s``, or ``TOILING_S`` at work.
 
     A thread in which the source hangs for ever is left behind; it does not keep the process from ending.
     """
@@ -106,13 +112,37 @@ class WatchedReading:
         if not self._is_asked:
             self._wanted.put(until_ns)
             self._is_asked = True
-        try:
-            part = self._parts.get(timeout=self._silent_after_s if self._silent_since_ns is None else 0.0)
-        except Empty:
+        part = self._wait()
+        if part is None:
             self._silent_since_ns = self._silent_since_ns or time.monotonic_ns()
             return Part()
         self._is_asked, self._silent_since_ns = False, None
         return part
+
+    def _wait(self) -> Part | None:
+        """What comes; None where the source is silent."""
+        if self._silent_since_ns is not None:
+            return self._part_within(0.0)
+        slices, patience, worked_ns = 0, round(self._silent_after_s / _SLICE_S), self._worked_ns()
+        while (part := self._part_within(_SLICE_S)) is None:
+            slices += 1
+            if slices % patience:
+                continue
+            before_ns, worked_ns = worked_ns, self._worked_ns()
+            if worked_ns - before_ns < _IDLE_NS or slices * _SLICE_S >= TOILING_S:
+                return None
+        return part
+
+    def _part_within(self, seconds: float) -> Part | None:
+        try:
+            return self._parts.get(timeout=seconds)
+        except Empty:
+            return None
+
+    def _worked_ns(self) -> int:
+        """Processor time that the source has taken so far."""
+        assert self._thread.ident is not None
+        return time.clock_gettime_ns(time.pthread_getcpuclockid(self._thread.ident))
 
     def close(self) -> None:
         """Close the source, from another thread where it hangs."""

@@ -70,6 +70,9 @@ def record_scene_takes(
     ChangedConfigError where it was begun with another config; else what ``record_scene`` raises.
     """
     session_id = random_id() if config.realtime else derived_id(dump_config(config))
+    make_driver(
+        config.driver, SceneSource(layout_for(config.scenario, config.seed), config.scene)
+    )  # or nothing is begun
     with nullcontext(interrupt) if interrupt is not None else deferred_interrupt() as interrupt:
         session = SessionFolder.resume(folder, config) if resume else SessionFolder.create(folder, config, session_id)
         cut_off = session.cut_off

@@ -105,6 +105,38 @@ def test_it_drives_on_when_the_source_answers_again_and_no_scan_is_lost(hanging:
     assert hanging.driver.name in drivers[drivers.index(STOP) :]
 
 
+class Busy(HangingSource):
+    """Computes for a while where the other hangs."""
+
+    busy_s = 0.0
+
+    def read(self, until_ns: int) -> Iterator[Received]:
+        end_s = time.thread_time() + self.busy_s
+        while time.thread_time() < end_s:
+            pass
+        yield from TapeSource.read(self, until_ns)
+
+
+def test_a_source_that_computes_is_waited_for_longer() -> None:
+    source = Busy([scan(n) for n in range(3)])
+    source.busy_s = 0.15
+    reading = WatchedReading(source, lambda: False, silent_after_s=0.04)
+    part = reading.read(scan(2).received_ns)
+    assert (len(part.sensed), part.read_to_ns, reading.silent_s) == (3, scan(2).received_ns, 0.0)
+    reading.close()
+    assert source.closed == 1
+
+
+def test_but_not_for_ever(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("sdt_tools.recording.live.reading.TOILING_S", 0.08)
+    source = Busy([scan(n) for n in range(3)])
+    source.busy_s = 0.3
+    reading = WatchedReading(source, lambda: False, silent_after_s=0.04)
+    assert reading.read(scan(2).received_ns).sensed == ()
+    assert reading.silent_s > 0
+    reading.close()
+
+
 def test_closing_does_not_wait_for_a_source_that_hangs_in_close_too(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("sdt_tools.recording.live.reading._CLOSE_S", 0.05)
     let_go = threading.Event()
