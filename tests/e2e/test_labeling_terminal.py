@@ -79,6 +79,17 @@ def test_resizing_in_the_middle(tmp_path: Path, labeling: Start) -> None:
     assert terminal.end() == 0
 
 
+def test_keys_that_come_at_once_are_taken_one_after_the_other(tmp_path: Path, labeling: Start) -> None:
+    drive = record(tmp_path / "drive.mcap", 60)
+    terminal = labeling(*label(tmp_path, drive, "anna"))
+    terminal.wait_for("? keys")
+    terminal.press("g0.8\r2g1.23\x7f\x7f\r" + RIGHT + "5g#60\r")  # as from a connection that was slow
+    terminal.until(lambda: frame_shown(terminal, 60) == 60, "the last frame is not shown")
+    terminal.press(QUIT)
+    assert terminal.end() == 0
+    assert rows_labelled(tmp_path / "labels" / "drive.motion.csv", "anna") == [40, 51]
+
+
 @pytest.mark.parametrize("how", ["hang-up", "SIGTERM"])
 def test_the_end_of_a_terminal_is_the_end_of_the_app_and_nothing_is_lost(
     tmp_path: Path, labeling: Start, how: str
