@@ -197,7 +197,7 @@ def test_in_tmux_the_screen_is_what_it_should_be(tmp_path: Path) -> None:
         screen_with("? keys")
         call("send-keys", "-t", "label", "f", "2", "Right", "Right", "Right", "4")
         lines = screen_with("4/30")
-        lines = screen_with("you            4  13.3%")
+        lines = screen_with("2224")
         assert len(lines) == 24
         assert "drive motion  anna" in lines[0]
         assert lines[2].split()[-1] == "3"

@@ -6,7 +6,7 @@ from typing import ClassVar, Final
 import numpy as np
 from rich.style import Style
 from rich.text import Text
-from textual import events, on
+from textual import on
 from textual.binding import BindingType
 from textual.containers import Horizontal, Vertical
 from textual.screen import ModalScreen
@@ -46,11 +46,6 @@ class JumpDialog(ModalScreen[int | None]):
         with Vertical():
             yield Static("Go to 12.5 or 1:02.5 · +3 or -3 seconds · #120 · 50%", markup=False)
             yield Line(self._go)
-
-    async def on_key(self, event: events.Key) -> None:
-        """Keys that come before the line listens."""
-        if self.focused is None:
-            await self.query_one(Line).take(event)
 
     def _go(self, text: str) -> None:
         """Give the frame, or say what is meant."""

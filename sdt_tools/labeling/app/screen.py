@@ -28,7 +28,6 @@ from sdt_tools.labeling.app.words import HINTS, class_table, frame_words, headin
 from sdt_tools.labeling.frame_labels import UNSAID
 from sdt_tools.labeling.review import ReviewItem
 from sdt_tools.labeling.vocabulary import LabelKind
-from sdt_tools.terminal.line import belongs_elsewhere
 from sdt_tools.terminal.picture_view import PictureView
 from sdt_tools.terminal.raster import style
 from sdt_tools.terminal.scan_view import ScanView
@@ -94,8 +93,6 @@ class LabelingScreen(Screen[None]):
 
     async def on_key(self, event: events.Key) -> None:
         """Give a class, or do what the key is for."""
-        if await belongs_elsewhere(self, event):
-            return
         names = [name for name in (event.character, event.key) if name]
         number = next((found for name in names if (found := class_of(name, self._kind)) is not None), None)
         if number is not None:

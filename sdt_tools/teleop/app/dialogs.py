@@ -5,7 +5,6 @@ from typing import ClassVar
 
 from rich.style import Style
 from rich.text import Text
-from textual import events
 from textual.binding import BindingType
 from textual.containers import Horizontal, Vertical
 from textual.screen import ModalScreen
@@ -64,11 +63,6 @@ class NoteDialog(ModalScreen[str]):
         with Vertical():
             yield Static(f"{self._mark} is set. A note on it? Enter ends it · Esc is the emergency stop", markup=False)
             yield Line(self._give)
-
-    async def on_key(self, event: events.Key) -> None:
-        """Keys that come before the line listens."""
-        if self.focused is None:
-            await self.query_one(Line).take(event)
 
     def _give(self, note: str) -> None:
         """Once: a key that repeats must not close what is below."""

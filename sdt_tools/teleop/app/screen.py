@@ -18,7 +18,6 @@ from sdt_tools.teleop.app.dialogs import HelpDialog, NoteDialog
 from sdt_tools.teleop.app.keys import ACTIONS, MOTION_KEYS
 from sdt_tools.teleop.app.words import BRIGHT, DIM, changes, heading, ink, messages, motion_panel, streams_panel
 from sdt_tools.teleop.cockpit import Cockpit
-from sdt_tools.terminal.line import belongs_elsewhere
 from sdt_tools.terminal.picture_view import PictureView
 from sdt_tools.terminal.scan_view import ScanView
 
@@ -81,8 +80,6 @@ class CockpitScreen(Screen[None]):
 
     async def on_key(self, event: events.Key) -> None:
         """Drive, or do what the key is for."""
-        if await belongs_elsewhere(self, event):
-            return
         names = [name for name in (event.character, event.key) if name]
         motion = next((MOTION_KEYS[name.lower()] for name in names if name.lower() in MOTION_KEYS), None)
         if motion is not None:

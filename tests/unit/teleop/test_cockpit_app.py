@@ -165,7 +165,7 @@ def test_enter_that_repeats_closes_what_is_open_and_nothing_below(opened: str) -
             if isinstance(dialog, HelpDialog):
                 dialog.action_close()
             else:
-                await dialog.query_one(Line).take(events.Key("enter", None))
+                await dialog.query_one(Line).on_key(events.Key("enter", None))
         await pilot.pause()
         assert isinstance(app.screen, CockpitScreen)
 
