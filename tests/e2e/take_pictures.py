@@ -58,7 +58,7 @@ def take(terminal: Terminal, folder: Path, name: str) -> None:
     browser = [_browser(), "--headless", "--no-sandbox", "--hide-scrollbars", size, f"--screenshot={shot}", str(page)]
     subprocess.run(browser, check=True, capture_output=True)
     with Image.open(shot) as image:
-        image.convert("RGB").quantize(256, Image.Quantize.MEDIANCUT).save(PICTURES / f"{name}.png", optimize=True)
+        image.convert("RGB").save(PICTURES / f"{name}.png", optimize=True)
 
 
 def _browser() -> str:
