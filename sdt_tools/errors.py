@@ -9,7 +9,8 @@ SdtError                     exit 1: something failed
 │   ├── DatasetError         a data set that cannot be built or used
 │   ├── CheckpointError      a model folder
 │   └── OutputExistsError    an output that would be written over
-└── RunError                 a unit of work failed; what was finished before is kept
+├── RunError                 a unit of work failed; what was finished before is kept
+└── DeviceError              a device of the robot cannot be reached, refuses, or is another one
 
 A message says what happened, where, and what the user can do.
 """
@@ -63,3 +64,7 @@ class OutputExistsError(UsageError):
 
 class RunError(SdtError):
     """A unit of work failed."""
+
+
+class DeviceError(SdtError):
+    """A device of the robot cannot be reached, refuses, or is another one."""

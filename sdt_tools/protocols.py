@@ -4,7 +4,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from typing import Protocol, runtime_checkable
 
-from sdt_tools.frames import CameraImage, Gesture, LidarScan, MotionClass, RawPicture, Received, Twist
+from sdt_tools.frames import CameraImage, Gesture, LidarScan, Mode, MotionClass, RawPicture, Received, Twist
 
 
 @dataclass(frozen=True)
@@ -85,13 +85,16 @@ class Driver(Protocol):
 class Choice:
     """A motion class, which of several drivers has chosen it, and at what share of the class's twist it is driven.
 
-    ``intervention`` says that a person has taken over from a driver that is a program.
+    ``intervention`` says that a person has taken over from a driver that is a program; ``mode`` is that of the
+    controller. ``says`` is for the session log, once, as long as choice after choice says the same.
     """
 
     motion: MotionClass
     driver: str
     speed: float = 1.0
     intervention: bool = False
+    mode: Mode = Mode.ACTIVE
+    says: str = ""
 
 
 @runtime_checkable

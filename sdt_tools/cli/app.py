@@ -30,9 +30,11 @@ VERBS = (
     "attack",
     "check",
     "evaluate",
+    "drive",
     "replay",
     "errors",
     "view",
+    "robot",
     "paper",
 )
 """In the order of the flow. Each is a module here (``import_`` for ``import``) with a ``command``, or an ``app``."""

@@ -11,7 +11,7 @@ from sdt_tools.scene.source import SceneSource
 FORMS = "expert, constant:CLASS, policy:MODEL_DIR, keyboard or gamepad"
 
 
-def make_driver(name: str, source: SceneSource) -> Driver:
+def make_driver(name: str, source: SceneSource, option: str = "--driver", forms: str = FORMS) -> Driver:
     """The driver called ``name`` (``expert``, ``constant:CLASS``, ``policy:MODEL_DIR``) for ``source``.
 
     Raises UsageError for any other name or an unknown class, CheckpointError for a folder that holds no network.
@@ -26,4 +26,4 @@ def make_driver(name: str, source: SceneSource) -> Driver:
         from sdt_tools.models.checkpoint import load_checkpoint
 
         return PolicyDriver(load_checkpoint(Path(rest)))
-    raise UsageError(f"--driver {name}: no such driver; choose {FORMS}")
+    raise UsageError(f"{option} {name}: no such driver; choose {forms}")

@@ -1,5 +1,6 @@
 """``sdt errors``: why frames are wrong."""
 
+from enum import StrEnum
 from pathlib import Path
 from typing import Annotated
 
@@ -8,6 +9,15 @@ import typer
 from sdt_tools.cli import errors_claims, errors_compare, errors_selftest, errors_suspects
 from sdt_tools.cli.console import JsonFlag, console, emit, print_incomplete
 from sdt_tools.cli.default_command import WithDefault
+
+
+class Near(StrEnum):
+    """Where frames are neighbours."""
+
+    SCAN = "scan"
+    FEATURE = "feature"
+    TIME = "time"
+
 
 app = typer.Typer(
     cls=WithDefault,
@@ -38,12 +48,26 @@ def analyse(
     ],
     out: Annotated[Path, typer.Option(help="Folder to write: report.html, tags.parquet, errors.json, figures.")],
     model: Annotated[str | None, typer.Option(help="Model, where the predictions are of several.")] = None,
-    config: Annotated[Path | None, typer.Option(help="TOML file of options, such as loss, eta and epsilon_m.")] = None,
+    neighbourhood: Annotated[
+        Near | None,
+        typer.Option(
+            help="Where the neighbours of a transient error are: in scans (follow networks), in the network's feature "
+            "space (vision networks), or in time (frames within so many ms). [scan or feature]"
+        ),
+    ] = None,
+    config: Annotated[
+        Path | None,
+        typer.Option(
+            help="TOML file of options, such as loss, eta, and the ε of each neighbourhood: epsilon_m, "
+            "epsilon_feature, epsilon_ms."
+        ),
+    ] = None,
     json_output: JsonFlag = False,
 ) -> None:
     """Tag every wrong frame: systematic, conditional (and on what), transient, isolated or unexplained.
 
-    While it works, the scans lie in a nameless file beside --out, 2.2 kB each: they need not fit in memory.
+    While it works, scans or features lie in a nameless file beside --out, 2.2 kB a scan, 4 bytes a feature: they need
+    not fit in memory.
     """
     from sdt_tools.cli.progress import progress_bar
     from sdt_tools.config import load_config
@@ -51,7 +75,9 @@ def analyse(
     from sdt_tools.error_analysis.definitions import ErrorOptions
 
     options = load_config(ErrorOptions, config)
-    with progress_bar("scans, then neighbours") as progress:
+    if neighbourhood:
+        options = options.model_copy(update={"neighbourhood": neighbourhood.value})
+    with progress_bar("frames, then neighbours") as progress:
         report = analyse_errors(predictions, recordings, options, out, model, progress)
     if json_output:
         emit({**report.document(), "out": str(out)})
@@ -62,8 +88,11 @@ def analyse(
     for tag, share in report.tags.items():
         table.add_row(str(tag), f"{share.count:,}", f"{share.share:.2%}", f"{share.low:.2%} to {share.high:.2%}")
     console.print(table)
-    epsilon_m = report.epsilon.epsilon_m
-    console.print(f"{report.errors:,} errors in {report.frames:,} labelled frames; ε = {epsilon_m:.3g} m")
+    epsilon = report.epsilon
+    console.print(
+        f"{report.errors:,} errors in {report.frames:,} labelled frames; neighbours in {epsilon.measure.neighbourhood} "
+        f"up to ε = {epsilon.text}"
+    )
     if report.conditions:
         found = Table("condition", "frames", "mean loss inside", "outside", "p (Holm)")
         for condition in report.conditions:

@@ -44,7 +44,11 @@ def command(
     config: Annotated[Path | None, typer.Option(help="TOML file of options, such as loss and resamples.")] = None,
     json_output: JsonFlag = False,
 ) -> None:
-    """Say of each claim of the paper whether predictions support it, contradict it, or leave it undecided."""
+    """Say of each claim of the paper whether predictions support it, contradict it, or leave it undecided.
+
+    Of vision networks these are the two claims about adversarial training, judged of those whose checkpoints say that
+    they were trained so, and of those named.
+    """
     from sdt_tools.cli.progress import progress_bar
     from sdt_tools.config import load_config
     from sdt_tools.error_analysis.claims.judge import Sources, judge_claims

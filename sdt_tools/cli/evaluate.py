@@ -5,6 +5,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from sdt_tools.cli import evaluate_vision
 from sdt_tools.cli.console import JsonFlag, console, emit
 
 if TYPE_CHECKING:
@@ -19,6 +20,9 @@ app = typer.Typer(no_args_is_help=True, help="Drive networks through scenarios a
 @app.callback()
 def evaluate() -> None:
     """Drive networks through scenarios and count what comes of it."""
+
+
+app.command("vision")(evaluate_vision.command)
 
 
 @app.command("follow")
@@ -50,7 +54,8 @@ def follow(
     from sdt_tools.config import load_config
     from sdt_tools.errors import UsageError
     from sdt_tools.evaluation.closed_loop import ClosedLoopConfig
-    from sdt_tools.evaluation.evaluate import evaluate_follow, parse_seeds
+    from sdt_tools.evaluation.evaluate import evaluate_follow
+    from sdt_tools.evaluation.grid import parse_seeds
     from sdt_tools.evaluation.saving import SaveRuns
     from sdt_tools.scene.scenario import STANDARD_FOLLOW
 

@@ -41,3 +41,37 @@ def follow(
         emit(json.loads(report.with_suffix(".json").read_text(encoding="utf-8")))
     else:
         console.print(f"report     {report}")
+
+
+@app.command("vision")
+def vision(
+    out: Annotated[Path, typer.Option(help="Folder of all that is made; a rerun resumes what it has.")] = Path(
+        "analysis/vision"
+    ),
+    follow: Annotated[
+        str | None, typer.Option(help="Who drives while active: a follow network's folder, or expert. [expert]")
+    ] = None,
+    config: Annotated[Path | None, typer.Option(help="TOML file with the study's sizes and settings.")] = None,
+    workers: Annotated[int, typer.Option(min=1, help="Processes, one thread each.")] = 2,
+    json_output: JsonFlag = False,
+) -> None:
+    """Record, train, attack and drive the vision networks of all ε: about two hours on two cores.
+
+    Gives the paper's Tables I and V with intervals, and the attack figure.
+    """
+    import json
+
+    from sdt_tools.cli.progress import stage_progress
+    from sdt_tools.config import load_config
+    from sdt_tools.paper.vision_config import VisionStudyConfig
+    from sdt_tools.paper.vision_study import run_vision_study
+
+    settings = load_config(VisionStudyConfig, config)
+    if follow is not None:
+        settings = settings.model_copy(update={"follow": follow})
+    with stage_progress() as progress:
+        report = run_vision_study(out, settings, workers, progress)
+    if json_output:
+        emit(json.loads(report.with_suffix(".json").read_text(encoding="utf-8")))
+    else:
+        console.print(f"report     {report}")

@@ -1,21 +1,19 @@
 """``sdt record``: recordings."""
 
 import re
-import signal
-import sys
-from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
+from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from sdt_tools.cli.console import JsonFlag, console, emit
+from sdt_tools.cli.endings import last_words
 from sdt_tools.cli.live import Live
 from sdt_tools.errors import OutputExistsError, UsageError
 
 if TYPE_CHECKING:
-    from sdt_tools.recording.live.outcome import Ending, RecordingSummary
+    from sdt_tools.recording.live.outcome import RecordingSummary
     from sdt_tools.recording.live.scene_session import SceneRecordingConfig
 
 KEYS_HELP = (
@@ -116,7 +114,7 @@ def scene(
     assert out is not None
     recording = parse_config(SceneRecordingConfig, values, "record scene", _OPTIONS)
     summary = _record_one(recording, out, how)
-    with _last_words(summary.ending):
+    with last_words(summary.ending):
         if json_output:
             emit(_document(out, summary))
         else:
@@ -162,7 +160,7 @@ def _scene_session(
     keep_last_s = None if keep_last is None else seconds_of(keep_last)
     config = parse_config(SceneTakesConfig, {**values, "keep_last_s": keep_last_s}, "record scene", _OPTIONS)
     summary = record_takes(config, folder, resume, how)
-    with _last_words(summary.ending):
+    with last_words(summary.ending):
         if json_output:
             emit(session_document(summary))
         else:
@@ -176,23 +174,6 @@ def seconds_of(text: str) -> float:
     if seconds <= 0:
         raise UsageError(f"--keep-last {text}: no length of time; write it as 30s or 2min")
     return seconds
-
-
-@contextmanager
-def _last_words(ending: "Ending") -> Iterator[None]:
-    """Print in the block; then exit with 128 + n where a signal other than Ctrl-C ended it, with 1 for a full disk.
-
-    A terminal that has hung up is not written to.
-    """
-    code = {"terminated": 128 + signal.SIGTERM, "hangup": 128 + signal.SIGHUP, "disk": 1}.get(ending, 0)
-    try:
-        yield
-        sys.stdout.flush()
-    except OSError:
-        if code != 128 + signal.SIGHUP:
-            raise
-    if code:
-        raise typer.Exit(code)
 
 
 def _document(out: Path, summary: "RecordingSummary") -> dict[str, object]:

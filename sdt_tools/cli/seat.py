@@ -13,6 +13,7 @@ from sdt_tools.teleop.hand import GAMEPAD, KEYBOARD
 
 if TYPE_CHECKING:
     from sdt_tools.config import MotionConfig
+    from sdt_tools.control.controller import Controller
     from sdt_tools.protocols import Chooser, Observer
     from sdt_tools.recording.live.scene_session import MakeDriver
     from sdt_tools.scene.source import SceneSource
@@ -58,6 +59,28 @@ def seat(
 
     with closing(open_gamepad(hand)) if how.gamepad or driver == GAMEPAD else nullcontext():
         yield cockpit, make_seated
+
+
+@contextmanager
+def seat_beside(
+    driver: str, title: str, how: Live
+) -> "Iterator[tuple[Cockpit, Callable[[Controller, SceneSource], Chooser]]]":
+    """A cockpit, and what puts its hand beside a controller. Raises UsageError as ``seat``."""
+    from sdt_tools.teleop.cockpit import Cockpit
+    from sdt_tools.teleop.gamepad import open_gamepad
+    from sdt_tools.teleop.hand import Hand
+    from sdt_tools.teleop.takeover import Takeover
+
+    hand = Hand(how.hold_s)
+    cockpit = Cockpit(title, driver, hand, takes=False, by_hand=False)
+
+    def seated(controller: "Controller", source: "SceneSource") -> "Chooser":
+        cockpit.operator = source
+        cockpit.driver = controller.name
+        return Takeover(controller, hand)
+
+    with closing(open_gamepad(hand)) if how.gamepad else nullcontext():
+        yield cockpit, seated
 
 
 def viewer_observers(wanted: bool, motions: "MotionConfig", realtime: bool) -> "Callable[[], Sequence[Observer]]":

@@ -22,7 +22,10 @@ def command(
     ] = None,
     predictions: Annotated[
         list[Path] | None,
-        typer.Option(help="Predictions by sdt replay; may be given several times. The first model colours the scans."),
+        typer.Option(
+            help="Predictions by sdt replay; may be given several times. The first follow network colours the scans, "
+            "and the answers of vision networks stand in the pictures."
+        ),
     ] = None,
     errors: Annotated[
         list[Path] | None,

@@ -1,1 +1,1 @@
-"""Who drives: a network as a driver of the robot."""
+"""Who drives: networks as drivers of the robot, the modes between them, the loop around them."""

@@ -5,14 +5,16 @@ from typing import Final
 
 import cv2
 import numpy as np
+import simplejpeg
 from jaxtyping import Int64
 
 from sdt_tools.frames import CameraImage
 from sdt_tools.recording.messages.topics import CAMERA_IMAGE
 from sdt_tools.recording.reader import Recording
 
-_JPEG_STARTS, _JPEG_ENDS = b"\xff\xd8", b"\xff\xd9"
-_PADDING: Final = b"\0"
+_JPEG_STARTS: Final = b"\xff\xd8"
+_REDUCED: Final = 8
+"""To see whether a picture can be read, it is decoded at an eighth of its size."""
 
 
 def picture_stamps(recording: Recording) -> tuple[Int64[np.ndarray, "pictures"], tuple[int, ...]]:
@@ -37,14 +39,26 @@ def picture_bytes(recording: Recording, positions: Int64[np.ndarray, "chosen"]) 
 
 def readable(data: bytes) -> bool:
     """Whether ``data`` is a whole picture."""
-    if breaks_off(data):
-        return False
+    if is_jpeg(data):
+        return jpeg_damage(data) is None
     return bool(data) and cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_REDUCED_GRAYSCALE_8) is not None
 
 
-def breaks_off(data: bytes) -> bool:
-    """Whether ``data`` is a JPEG without its end: decoders make grey of what is missing."""
-    return data.startswith(_JPEG_STARTS) and not data.rstrip(_PADDING).endswith(_JPEG_ENDS)
+def is_jpeg(data: bytes) -> bool:
+    """Whether ``data`` begins as a JPEG does."""
+    return data.startswith(_JPEG_STARTS)
+
+
+def jpeg_damage(data: bytes) -> str | None:
+    """What is wrong with a JPEG, in the decoder's words; None for nothing that can be seen.
+
+    Most decoders fill up what is damaged, or missing, with grey and say nothing.
+    """
+    try:
+        simplejpeg.decode_jpeg(data, "GRAY", min_factor=_REDUCED, strict=True)
+    except ValueError as error:
+        return str(error)
+    return None
 
 
 def _images(recording: Recording) -> Iterator[CameraImage]:

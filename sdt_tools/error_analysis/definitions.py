@@ -13,6 +13,7 @@ which it was not found. By Proposition 2 a transient error is a condition of one
 goes first.
 """
 
+from collections.abc import Mapping
 from enum import StrEnum
 from typing import Final, Literal
 
@@ -23,6 +24,13 @@ from pydantic import Field, model_validator
 from sdt_tools.config import Config
 
 Selection = Literal["all", "scenario", "recording"]
+Neighbourhood = Literal["scan", "feature", "time"]
+EPSILON_OPTIONS: Final[Mapping[Neighbourhood, str]] = {
+    "scan": "epsilon_m",
+    "feature": "epsilon_feature",
+    "time": "epsilon_ms",
+}
+"""The option that sets ε in each neighbourhood."""
 
 
 class Tag(StrEnum):
@@ -55,11 +63,33 @@ DEFAULT_FEATURES: Final = (
     "in_level_3",
     "in_level_4",
 )
-"""Columns of predictions that conditions are made of; ``|x|`` is the magnitude of ``x``.
+"""Columns of predictions of scans that conditions are made of; ``|x|`` is the magnitude of ``x``.
 
 What the model answered is not among them, nor the command that it may have given: errors explained by the wrong answer
 itself say nothing. Neither is the recording, which cannot be confirmed on another one.
 """
+
+PICTURE_FEATURES: Final = (
+    "operator_range_m",
+    "operator_bearing_rad",
+    "|operator_bearing_rad|",
+    "operator_turned_rad",
+    "gesture",
+    "behaviour",
+    "arms_changed_s",
+    "brightness",
+    "contrast",
+    "blown_share",
+    "sharpness",
+    "speed_mps",
+    "|turn_radps|",
+    "mode",
+    "scenario",
+    "light",
+    "surroundings",
+    "mask",
+)
+"""The same for predictions of pictures."""
 
 
 class ConditionOptions(Config):
@@ -89,8 +119,11 @@ class ErrorOptions(Config):
     """Every choice behind a tag; saved with every result.
 
     ``loss``: ``zero_one``, or ``cross_entropy``, for which ``eta`` must be chosen. ``fill_codes`` and ``clip_m`` shape
-    the scans before distances are taken. ``epsilon_m`` (root mean square per ray) is estimated where it is not given:
-    the percentile ``epsilon_percentile`` of the distances between successive frames. ``tau``: share of right frames
+    the scans before distances are taken. ``neighbourhood``: where frames are near each other, in ``scan`` (root mean
+    square per ray), in ``feature`` (of a vision network: root mean square per feature) or in ``time``; without it, scan
+    for a follow network and feature for a vision network. ε, in it ``epsilon_m``, ``epsilon_feature`` or
+    ``epsilon_ms``, is estimated where it is not given: the percentile ``epsilon_percentile`` of the distances between
+    successive frames. ``tau``: share of right frames
     that a systematic error bears. ``selections``: the data over which Definition 2 is asked, each at least
     ``min_selection_frames`` large. ``guard``: a transient error also needs the frames just before and after (within
     ``max_gap_s``) to be right; fast turns carry them beyond ε.
@@ -100,7 +133,10 @@ class ErrorOptions(Config):
     eta: float = Field(default=0.5, gt=0.0)
     fill_codes: bool = True
     clip_m: float = Field(default=2.5, gt=0.0, le=20.0)
+    neighbourhood: Neighbourhood | None = None
     epsilon_m: float | None = Field(default=None, gt=0.0)
+    epsilon_feature: float | None = Field(default=None, gt=0.0)
+    epsilon_ms: float | None = Field(default=None, gt=0.0)
     epsilon_percentile: float = Field(default=90.0, gt=0.0, lt=100.0)
     tau: float = Field(default=0.0, ge=0.0, lt=1.0)
     selections: tuple[Selection, ...] = ("all", "scenario", "recording")
@@ -115,6 +151,11 @@ class ErrorOptions(Config):
         if self.loss == "cross_entropy" and "eta" not in self.model_fields_set:
             raise ValueError("the loss cross_entropy needs a chosen eta (nats); add eta")
         return self
+
+    def epsilon_of(self, neighbourhood: Neighbourhood) -> float | None:
+        """ε as it is given for a neighbourhood."""
+        given: float | None = getattr(self, EPSILON_OPTIONS[neighbourhood])
+        return given
 
 
 def is_wrong(loss: Float[np.ndarray, "frames"], eta: float) -> Bool[np.ndarray, "frames"]:

@@ -10,9 +10,9 @@ from jaxtyping import Bool, Float64, Int64
 
 from sdt_tools.error_analysis.definitions import ErrorOptions, is_right, is_wrong
 from sdt_tools.errors import UsageError
-from sdt_tools.replay.predictions import SCHEMA, scan_predictions
+from sdt_tools.replay.predictions import SCHEMAS, PredictionKind, kind_of, scan_predictions
 
-UNUSED: Final = ("logits", "latency_us")
+UNUSED: Final = ("logits", "latency_us", "features")
 """Columns of predictions that no analysis of errors asks for, the widest among them."""
 
 
@@ -33,6 +33,11 @@ class LabelledFrames:
     right: Bool[np.ndarray, "frames"]
 
     @property
+    def kind(self) -> PredictionKind:
+        """Whether the frames are scans or pictures."""
+        return kind_of(self.table.columns)
+
+    @property
     def recordings(self) -> int:
         """How many recordings the frames come from."""
         return int(self.recording[-1]) + 1
@@ -46,14 +51,16 @@ def load_labelled(predictions: Path, options: ErrorOptions, model: str | None = 
     rows = scan_predictions([predictions])
     models = rows.select(pl.col("model").unique().sort()).collect()["model"].to_list()
     if not models:
-        raise UsageError(f"{predictions}: holds no frames; replay a recording that has scans")
+        raise UsageError(f"{predictions}: holds no frames; replay a recording that has some")
     if model is None and len(models) > 1:
         raise UsageError(f"{predictions}: holds predictions of {len(models)} models ({', '.join(models)}); name one")
     if model is not None and model not in models:
         raise UsageError(f"{predictions}: no predictions of model '{model}'; it holds {', '.join(models)}")
     labelled = rows.filter((pl.col("model") == (model or models[0])) & pl.col("label").is_not_null())
     asked = [name.strip("|") for name in options.conditions.features]
-    kept = [name for name in rows.collect_schema().names() if name in asked or (name in SCHEMA and name not in UNUSED)]
+    names = rows.collect_schema().names()
+    schema = SCHEMAS[kind_of(names)]
+    kept = [name for name in names if name in asked or (name in schema and name not in UNUSED)]
     table = labelled.select(kept).collect(engine="streaming")
     if table.is_empty():
         raise UsageError(

@@ -74,12 +74,12 @@ def build_index(scans: Float32[np.ndarray, "frames rays"], workers: int | None =
 def count_neighbours(
     index: NeighbourIndex,
     rows: Int64[np.ndarray, "queries"],
-    epsilon_m: float,
+    epsilon: float,
     groups: Bool[np.ndarray, "groups frames"],
     workers: int | None = None,
     progress: Progress | None = None,
 ) -> Int64[np.ndarray, "groups queries"]:
-    """How many frames of each group lie within ``epsilon_m`` (root mean square per ray) of the frames ``rows``.
+    """How many frames of each group lie within ``epsilon`` (root mean square) of the frames ``rows``.
 
     Neither the frame itself nor an exact copy of it counts. At most 63 groups. The counts are the same for any number
     of ``workers``; ``progress`` hears of the queries done.
@@ -91,7 +91,7 @@ def count_neighbours(
         bits |= group[index.order].astype(np.int64) << position
     place = np.empty_like(index.order)
     place[index.order] = np.arange(len(place))
-    limit = epsilon_m * epsilon_m * index.scans.shape[1]
+    limit = epsilon * epsilon * index.scans.shape[1]
     length, slack = np.sqrt(limit), index.key_slack
     outer = (length + slack) ** 2 * (1.0 + KEY_MARGIN)
     inner = (length - slack) ** 2 * (1.0 - KEY_MARGIN) if length > slack else -1.0  # below rounding keys say nothing

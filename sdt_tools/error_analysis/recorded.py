@@ -1,4 +1,4 @@
-"""The scans of frames, fetched again from the recordings: predictions carry stamps, not scans."""
+"""What recordings hold of frames, fetched again: predictions carry stamps, neither scans nor pictures."""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -9,7 +9,7 @@ from jaxtyping import Float32
 from sdt_tools.error_analysis.definitions import ErrorOptions
 from sdt_tools.error_analysis.distance import situations
 from sdt_tools.error_analysis.labelled import LabelledFrames
-from sdt_tools.error_analysis.scratch import scratch_scans
+from sdt_tools.error_analysis.scratch import scratch_rows
 from sdt_tools.errors import RecordingError
 from sdt_tools.frames import RAYS
 from sdt_tools.recording.incomplete import Incomplete, incomplete
@@ -49,11 +49,11 @@ def read_situations(
     """The situation of each frame, and the recordings that are cut off or damaged.
 
     ``paths`` are the recordings in the order of ``frames``. With ``scratch``, a folder, the situations lie in a
-    nameless file there (``scratch_scans``), else in memory. Raises RecordingError where a recording cannot be read or
+    nameless file there (``scratch_rows``), else in memory. Raises RecordingError where a recording cannot be read or
     lacks the scan of a frame.
     """
     total = len(frames.loss)
-    scans = scratch_scans(scratch, total) if scratch else np.empty((total, RAYS), np.float32)
+    scans = scratch_rows(scratch, total, RAYS) if scratch else np.empty((total, RAYS), np.float32)
     missing = []
     starts = np.searchsorted(frames.recording, np.arange(len(paths) + 1))
     for number, path in enumerate(paths):
@@ -77,6 +77,15 @@ def read_situations(
     if progress:
         progress(len(paths), len(paths))
     return scans, tuple(one for one in missing if one is not None)
+
+
+def incomplete_among(paths: Sequence[Path]) -> tuple[Incomplete, ...]:
+    """Those of the recordings that are cut off or damaged. Raises RecordingError where one cannot be read."""
+    found = []
+    for path in paths:
+        with Recording.open(path) as recording:
+            found.append(incomplete(recording))
+    return tuple(one for one in found if one is not None)
 
 
 def _identities(frames: LabelledFrames) -> list[tuple[str, str]]:

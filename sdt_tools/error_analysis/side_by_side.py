@@ -64,12 +64,12 @@ def load_side_by_side(paths: Sequence[Path], models: Sequence[str] = ()) -> Side
     held = rows.select(pl.col("model").unique().sort()).collect()["model"].to_list()
     where = ", ".join(str(path) for path in paths[:3]) + (" …" if len(paths) > 3 else "")
     if not held:
-        raise UsageError(f"{where}: no frames; replay a recording that has scans")
+        raise UsageError(f"{where}: no frames; replay a recording that has some")
     for name in models:
         if name not in held:
             raise UsageError(f"{where}: no predictions of model '{name}'; there are {', '.join(held)}")
     names = tuple(models) or tuple(held)
-    everything = [name for name in rows.collect_schema().names() if name != "logits"]
+    everything = [name for name in rows.collect_schema().names() if name not in ("logits", "features")]
     answers = ["recording", *KEYS, "label", *_ANSWERS]
     each = [_labelled(rows, name, answers if place else everything, where) for place, name in enumerate(names)]
     shared = each[0].select(*KEYS, "label")

@@ -13,9 +13,9 @@ import polars as pl
 from jaxtyping import Bool, Float64, Int64, UInt8, UInt32
 
 from sdt_tools.error_analysis.definitions import ErrorOptions, Tag, is_systematic, is_transient
-from sdt_tools.error_analysis.distance import follows_closely
+from sdt_tools.error_analysis.epsilon import follows_closely
 from sdt_tools.error_analysis.labelled import LabelledFrames
-from sdt_tools.error_analysis.neighbours import NeighbourIndex, count_neighbours
+from sdt_tools.error_analysis.spaces import Space
 from sdt_tools.runs.local import Progress
 
 TAGS: Final = tuple(Tag)
@@ -65,16 +65,16 @@ class Tagged:
 
 
 def error_neighbours(
-    index: NeighbourIndex,
+    space: Space,
     frames: LabelledFrames,
     inside: Bool[np.ndarray, "conditions frames"],
-    epsilon_m: float,
+    epsilon: float,
     progress: Progress | None = None,
 ) -> ErrorNeighbours:
     """Count the neighbours of each error frame among all frames; ``progress`` hears of the error frames done."""
     rows = np.flatnonzero(frames.wrong)
     groups = np.vstack([np.ones(len(frames.loss), bool), frames.right, inside])
-    counts = count_neighbours(index, rows, epsilon_m, groups, progress=progress)
+    counts = space.count(rows, epsilon, groups, progress)
     return ErrorNeighbours(rows, counts[0], counts[1], counts[2:])
 
 

@@ -13,6 +13,7 @@ from sdt_tools.config import Config
 from sdt_tools.evaluation.outcome import Judge, Situation, SuccessConfig, Verdict
 from sdt_tools.evaluation.policies import Policy
 from sdt_tools.evaluation.results import RunResult, TracePoint
+from sdt_tools.evaluation.situation import situation_in
 from sdt_tools.frames import RAYS, LidarScan, MotionClass, MotionCommand, Twist
 from sdt_tools.models.preprocess import FIRST_FRONT_RAY, LAST_FRONT_RAY
 from sdt_tools.robustness.domains import SafetyLevel, distance_rms_m
@@ -139,7 +140,7 @@ def _decide(
     motions = policy.decide(np.stack([scan.ranges_m for scan in scans]), [run.expert for run in runs])
     surroundings = _surroundings(true_ranges_m)
     for run, scan, around, motion in zip(runs, scans, surroundings, motions, strict=True):
-        situation = _situation(run)
+        situation = situation_in(run.world)
         run.trace.append(_trace_point(run.world, situation, around, motion))
         run.twist = config.scene.motions.twist(motion)
         if run.recorder:
@@ -167,21 +168,6 @@ def _surroundings(true_ranges_m: Float64[np.ndarray, "runs rays"]) -> list[_Surr
         distance_rms_m(true_ranges_m, SafetyLevel.FOUR),
     )
     return [_Surroundings(*values) for values in np.stack(columns, axis=1).tolist()]
-
-
-def _situation(run: _Run) -> Situation:
-    world, lidar, operator = run.world, run.world.lidar_pose, run.world.operator
-    dx_m, dy_m = operator.x_m - lidar.x_m, operator.y_m - lidar.y_m
-    return Situation(
-        time_s=world.time_s,
-        robot=world.robot,
-        operator_range_m=math.hypot(dx_m, dy_m),
-        operator_bearing_rad=math.remainder(math.atan2(dy_m, dx_m) - lidar.yaw_rad, math.tau),
-        operator_visible=world.operator_visible(),
-        operator_standing=world.operator_standing,
-        operator_ended=world.operator_done,
-        contact=world.contact,
-    )
 
 
 def _trace_point(world: World, now: Situation, around: _Surroundings, motion: MotionClass) -> TracePoint:

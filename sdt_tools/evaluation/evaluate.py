@@ -1,6 +1,5 @@
 """Policies × scenarios × seeds: units of closed-loop runs, and their tally."""
 
-import hashlib
 import json
 import time
 from collections.abc import Mapping, Sequence
@@ -8,17 +7,15 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
-import polars as pl
-
 from sdt_tools.config import dump_config
-from sdt_tools.errors import UsageError
 from sdt_tools.evaluation.closed_loop import ClosedLoopConfig, drive_closed_loop
 from sdt_tools.evaluation.failures import Nesting, WhereFailed, failure_table, nesting, where_failed
+from sdt_tools.evaluation.grid import check_given, gather, identity, refuse_repeated
 from sdt_tools.evaluation.policies import policy_for
 from sdt_tools.evaluation.results import RUNS_FILE, TRACES_FILE, Tally, tally, total, write_results
 from sdt_tools.evaluation.saving import SaveRuns, recorder_factory
 from sdt_tools.runs.local import Progress, run_units
-from sdt_tools.runs.unit import Unit, content_hash
+from sdt_tools.runs.unit import Unit
 from sdt_tools.scene.layout import Layout
 from sdt_tools.scene.scenario import layout_for
 
@@ -65,11 +62,11 @@ def evaluate_follow(
     ``models`` are checkpoint folders, ``expert``, ``polar`` or ``constant:<class>``; ``scenarios`` names or files.
     Raises UsageError for empty or repeated arguments and what loading a model or a scenario raises, before any run.
     """
-    _check(models, scenarios, seeds)
+    check_given({"model": models, "scenario": scenarios, "seed": seeds})
     drawn = [[layout_for(scenario, seed) for seed in seeds] for scenario in scenarios]
-    _refuse_repeated("scenario", [layouts[0].name for layouts in drawn])
+    refuse_repeated("scenario", [layouts[0].name for layouts in drawn])
     names = {model: _unit_name(model) for model in models}
-    _refuse_repeated("model", list(names.values()))
+    refuse_repeated("model", list(names.values()))
     units = {
         model: [unit for layouts in drawn for unit in _units(names[model], model, layouts, config, save)]
         for model in models
@@ -77,7 +74,7 @@ def evaluate_follow(
     folders = iter(run_units([unit for group in units.values() for unit in group], out, workers, progress))
     by_model = {model: [next(folders) for _ in group] for model, group in units.items()}
     every = [folder for group in by_model.values() for folder in group]
-    runs, traces = _gather(by_model, RUNS_FILE, out), _gather(by_model, TRACES_FILE, out)
+    runs, traces = gather(by_model, RUNS_FILE, out), gather(by_model, TRACES_FILE, out)
     failures = failure_table(runs, traces)
     failures.write_parquet(out / FAILURES_FILE)
     return EvaluationSummary(
@@ -91,17 +88,6 @@ def evaluate_follow(
         failures=out / FAILURES_FILE,
         recordings=tuple(sorted(path for folder in every for path in (folder / _RECORDINGS).glob("*.mcap"))),
     )
-
-
-def parse_seeds(text: str) -> list[int]:
-    """Seeds from ``7``, ``1000-1019`` or a list of such with commas. Raises UsageError."""
-    seeds: list[int] = []
-    for part in text.split(","):
-        first, dash, last = part.strip().partition("-")
-        if not first.isdecimal() or (dash and not last.isdecimal()) or (dash and int(last) < int(first)):
-            raise UsageError(f"--seeds {text}: give seeds as 7, 1000-1019 or 3,5,1000-1009")
-        seeds += range(int(first), int(last or first) + 1)
-    return seeds
 
 
 def run_block(out: Path, model: str, layouts: Sequence[Layout], config: ClosedLoopConfig, save: SaveRuns) -> None:
@@ -118,24 +104,9 @@ def run_block(out: Path, model: str, layouts: Sequence[Layout], config: ClosedLo
     (out / _TIMING_FILE).write_text(json.dumps(timing) + "\n", encoding="utf-8")
 
 
-def _check(models: Sequence[str], scenarios: Sequence[str], seeds: Sequence[int]) -> None:
-    for what, given in (("model", models), ("scenario", scenarios), ("seed", seeds)):
-        if not given:
-            raise UsageError(f"no {what} given; name at least one")
-        _refuse_repeated(what, given)
-
-
-def _refuse_repeated(what: str, names: Sequence[object]) -> None:
-    for name in names:
-        if names.count(name) > 1:
-            raise UsageError(f"{what} {name} is given twice; name each once")
-
-
 def _unit_name(model: str) -> str:
     policy = policy_for(model)
-    path = Path(model)
-    identity = content_hash(path) if path.is_dir() else hashlib.sha256(model.encode()).hexdigest()
-    return f"{policy.name.replace(':', '-')}-{identity[:8]}"
+    return f"{policy.name.replace(':', '-')}-{identity(model)}"
 
 
 def _units(name: str, model: str, layouts: Sequence[Layout], config: ClosedLoopConfig, save: SaveRuns) -> list[Unit]:
@@ -149,19 +120,6 @@ def _units(name: str, model: str, layouts: Sequence[Layout], config: ClosedLoopC
         )
         for block in blocks
     ]
-
-
-def _gather(by_model: Mapping[str, Sequence[Path]], file: str, out: Path) -> pl.DataFrame:
-    """The tables ``file`` of all units as one, the model as it was named before each row; written to ``out`` too."""
-    table = pl.concat(
-        [
-            pl.read_parquet(folder / file).select(pl.lit(model).alias("model"), pl.all())
-            for model, folders in by_model.items()
-            for folder in folders
-        ]
-    )
-    table.write_parquet(out / file)
-    return table
 
 
 def _real_time_factor(folders: Sequence[Path], workers: int) -> float:

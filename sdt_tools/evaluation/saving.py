@@ -1,12 +1,14 @@
 """Closed-loop runs kept as ordinary LiDAR recordings, the expert's advice beside each command."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from enum import StrEnum
 from pathlib import Path
 
 from sdt_tools.clock import FAST_EPOCH_NS
 from sdt_tools.evaluation.outcome import Outcome, Verdict
 from sdt_tools.frames import (
+    CameraImage,
     LidarScan,
     LogEntry,
     LogLevel,
@@ -60,19 +62,37 @@ class MemoryRecorder:
         failed = verdict.outcome is not Outcome.OK
         if self._keep is SaveRuns.NONE or (self._keep is SaveRuns.FAILED and not failed):
             return None
-        end_ns = self._messages[-1].stamp_ns
-        level = LogLevel.WARNING if failed else LogLevel.INFO
-        self._messages.append(LogEntry(end_ns, level, f"{verdict.outcome}: {verdict.reason}", name="evaluation"))
         driver = self._policy.replace(":", "-")
         name = f"{driver}_{self._layout.name}_{self._layout.seed}_{verdict.outcome}.mcap"
-        info = SourceInfo("scene", self._layout.name, self._layout.seed, {"lidar": "simulated SICK LMS1xx"})
-        notes = {"light": self._layout.light, "driver": self._policy, "outcome": verdict.outcome.value}
-        self._folder.mkdir(parents=True, exist_ok=True)
-        with RecordingWriter(self._folder / name, info, self._config_toml, notes=notes) as writer:
-            for message in self._messages:
-                writer.write(Received(message.stamp_ns, message))
+        told = Told(self._policy, verdict.outcome.value, verdict.reason, failed)
+        received = [Received(message.stamp_ns, message) for message in self._messages]
+        write_run(self._folder / name, self._layout, received, told, self._config_toml)
         self._messages.clear()
         return name
+
+
+@dataclass(frozen=True)
+class Told:
+    """What a kept run says of itself: who drove, and how it ended."""
+
+    driver: str
+    outcome: str
+    reason: str
+    failed: bool
+
+
+def write_run(path: Path, layout: Layout, messages: Sequence[Received], told: Told, config_toml: str) -> None:
+    """Write a run's ``messages``, and at their end what came of it, as the recording ``path``."""
+    cameras = {"camera": "simulated RGB camera"} if any(isinstance(m.message, CameraImage) for m in messages) else {}
+    info = SourceInfo("scene", layout.name, layout.seed, {"lidar": "simulated SICK LMS1xx", **cameras})
+    notes = {"light": layout.light, "driver": told.driver, "outcome": told.outcome}
+    end_ns = messages[-1].received_ns
+    level = LogLevel.WARNING if told.failed else LogLevel.INFO
+    last = LogEntry(end_ns, level, f"{told.outcome}: {told.reason}", name="evaluation")
+    path.parent.mkdir(parents=True, exist_ok=True)
+    with RecordingWriter(path, info, config_toml, notes=notes) as writer:
+        for received in (*messages, Received(end_ns, last)):
+            writer.write(received)
 
 
 def recorder_factory(

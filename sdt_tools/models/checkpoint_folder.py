@@ -68,12 +68,8 @@ def read_card(folder: Path, card: type[_CardT], kinds: Collection[str]) -> _Card
 
     Raises CheckpointError where there is none, it is of another format or kind, or its network answers other classes.
     """
-    if not folder.exists():
-        raise CheckpointError(f"{folder}: no such checkpoint; train one with 'sdt train'")
-    if not folder.is_dir():
-        raise CheckpointError(f"{folder}: is a file; a checkpoint is a folder with {CARD} and {WEIGHTS}")
     path = folder / CARD
-    values = _read_toml(path)
+    values = _read_values(folder)
     if values.get("format") != FORMAT:
         raise CheckpointError(f"{path}: format {values.get('format')!r}, but this version reads {FORMAT}")
     _check_kind(path, values.get("kind"), kinds)
@@ -87,6 +83,11 @@ def read_card(folder: Path, card: type[_CardT], kinds: Collection[str]) -> _Card
     return read
 
 
+def kind_in(folder: Path) -> object:
+    """What the card in ``folder`` says of the kind of its network. Raises CheckpointError where there is no card."""
+    return _read_values(folder).get("kind")
+
+
 def fill_network(folder: Path, network: nn.Module) -> None:
     """Give ``network`` the weights in ``folder`` and put it in inference mode.
 
@@ -96,6 +97,15 @@ def fill_network(folder: Path, network: nn.Module) -> None:
     _check_weights(folder, weights, network.state_dict())
     network.load_state_dict(weights)
     network.eval()
+
+
+def _read_values(folder: Path) -> dict[str, Any]:
+    """The card in ``folder`` as it stands."""
+    if not folder.exists():
+        raise CheckpointError(f"{folder}: no such checkpoint; train one with 'sdt train'")
+    if not folder.is_dir():
+        raise CheckpointError(f"{folder}: is a file; a checkpoint is a folder with {CARD} and {WEIGHTS}")
+    return _read_toml(folder / CARD)
 
 
 def _check_kind(path: Path, kind: object, kinds: Collection[str]) -> None:
@@ -156,7 +166,9 @@ def _read_bytes(path: Path) -> bytes:
     try:
         return path.read_bytes()
     except FileNotFoundError:
-        raise CheckpointError(f"{path}: missing, so {path.parent} is not a whole checkpoint") from None
+        raise CheckpointError(
+            f"{path}: missing, so {path.parent} is not a whole checkpoint; copy it again, or train it"
+        ) from None
     except OSError as error:
         raise CheckpointError(f"{path}: cannot be read: {error.strerror or error}") from None
 

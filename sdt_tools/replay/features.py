@@ -37,7 +37,7 @@ def scan_features(ranges_m: Float64[np.ndarray, "frames rays"]) -> pl.DataFrame:
             **{f"in_level_{int(level)}": _inside(resolved, level, distances_m[level]) for level in _LEVELS},
             **{f"distance_level_{int(level)}_m": distances_m[level] for level in _LEVELS[:-1]},
             "domain_distance_m": distances_m[_LEVELS[-1]],
-            "front_range_m": _known(np.where(np.isfinite(nearest_m), nearest_m, np.nan)),
+            "front_range_m": known(np.where(np.isfinite(nearest_m), nearest_m, np.nan)),
             "invalid_share": invalid.mean(axis=1),
         }
     )
@@ -59,9 +59,9 @@ def track_features(tracks: Tracks, stamps_ns: Int64[np.ndarray, "frames"]) -> pl
     experts = [None if command is None else command.expert for command in commands]
     return pl.DataFrame(
         {
-            "operator_range_m": _known(range_m),
-            "operator_bearing_rad": _known(bearing_rad),
-            "speed_mps": _known(tracks.robot.speed_mps(stamps_ns)),
+            "operator_range_m": known(range_m),
+            "operator_bearing_rad": known(bearing_rad),
+            "speed_mps": known(tracks.robot.speed_mps(stamps_ns)),
             "command": [None if command is None else command.motion.label for command in commands],
             "mode": [None if command is None else command.mode.label for command in commands],
             "expert": [None if expert is None else expert.label for expert in experts],
@@ -70,6 +70,6 @@ def track_features(tracks: Tracks, stamps_ns: Int64[np.ndarray, "frames"]) -> pl
     )
 
 
-def _known(values: Float64[np.ndarray, "frames"]) -> pl.Series:
+def known(values: Float64[np.ndarray, "frames"]) -> pl.Series:
     """Values with NaN as null."""
     return pl.Series(values, dtype=pl.Float64, nan_to_null=True)

@@ -1,7 +1,7 @@
 """One recording under one model: a row a frame, without a file."""
 
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Final, Literal, Protocol, runtime_checkable
 
@@ -87,12 +87,17 @@ def predict_recording(
     ).select(pl.col(name).cast(dtype) for name, dtype in SCHEMA.items())
 
 
-def cross_entropy(logits: Float32[np.ndarray, "frames classes"], labels: pl.Series) -> pl.Series:
-    """-log of the probability of each label, in nats; null where there is none."""
+def cross_entropy(
+    logits: Float32[np.ndarray, "frames classes"], labels: pl.Series, classes: Sequence[str] = CLASSES
+) -> pl.Series:
+    """-log of the probability of each label, in nats; null where there is none.
+
+    ``classes`` are the names of the logits, in order.
+    """
     exact = logits.astype(np.float64)
     largest = exact.max(axis=1, keepdims=True)
     normalizer = largest[:, 0] + np.log(np.exp(exact - largest).sum(axis=1))
-    chosen = labels.replace_strict({name: number for number, name in enumerate(CLASSES)}, default=None).cast(pl.Int64)
+    chosen = labels.replace_strict({name: number for number, name in enumerate(classes)}, default=None).cast(pl.Int64)
     losses = normalizer - exact[np.arange(len(exact)), chosen.fill_null(0).to_numpy()]
     return pl.select(pl.when(pl.Series(chosen.is_not_null())).then(pl.Series(losses))).to_series()
 

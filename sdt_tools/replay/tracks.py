@@ -37,14 +37,28 @@ class PoseTrack:
         """Speed along the heading, negative backwards; NaN where no pose is near."""
         if self.stamps_ns.size < 2:
             return np.full(len(stamps_ns), np.nan)
-        half = SPEED_WINDOW_NS // 2
-        ends_ns = np.clip([stamps_ns - half, stamps_ns + half], self.stamps_ns[0], self.stamps_ns[-1])
+        ends_ns, seconds, known = self._window(stamps_ns)
         before, after = (self._interpolated(end_ns) for end_ns in ends_ns)
         yaw_rad = self._interpolated(stamps_ns)[2]
         way_m = (after[0] - before[0]) * np.cos(yaw_rad) + (after[1] - before[1]) * np.sin(yaw_rad)
-        seconds = (ends_ns[1] - ends_ns[0]) * 1e-9
-        known = self._knows(stamps_ns) & (seconds > 0)
         return np.where(known, way_m / np.where(known, seconds, 1.0), np.nan)
+
+    def turn_radps(self, stamps_ns: Int64[np.ndarray, "frames"]) -> Float64[np.ndarray, "frames"]:
+        """How fast the heading turns, left positive; NaN where no pose is near."""
+        if self.stamps_ns.size < 2:
+            return np.full(len(stamps_ns), np.nan)
+        ends_ns, seconds, known = self._window(stamps_ns)
+        before_rad, after_rad = (self._interpolated(end_ns)[2] for end_ns in ends_ns)
+        return np.where(known, (after_rad - before_rad) / np.where(known, seconds, 1.0), np.nan)
+
+    def _window(
+        self, stamps_ns: Int64[np.ndarray, "frames"]
+    ) -> tuple[Int64[np.ndarray, "2 frames"], Float64[np.ndarray, "frames"], Bool[np.ndarray, "frames"]]:
+        """The window around each stamp, as far as poses reach: its ends, its length in seconds, whether it is known."""
+        half = SPEED_WINDOW_NS // 2
+        ends_ns = np.clip([stamps_ns - half, stamps_ns + half], self.stamps_ns[0], self.stamps_ns[-1])
+        seconds = (ends_ns[1] - ends_ns[0]) * 1e-9
+        return ends_ns, seconds, self._knows(stamps_ns) & (seconds > 0)
 
     def _interpolated(self, stamps_ns: Int64[np.ndarray, "frames"]) -> Float64[np.ndarray, "3 frames"]:
         start_ns = self.stamps_ns[0]  # float64 holds nanoseconds since the start exactly, since the epoch not
@@ -79,6 +93,16 @@ class Tracks:
         aside_m = operator_y_m - (y_m + LIDAR_AHEAD_M * np.sin(yaw_rad))
         bearing_rad = np.arctan2(aside_m, ahead_m) - yaw_rad
         return np.hypot(ahead_m, aside_m), (bearing_rad + np.pi) % (2 * np.pi) - np.pi
+
+    def operator_turned_rad(self, stamps_ns: Int64[np.ndarray, "frames"]) -> Float64[np.ndarray, "frames"]:
+        """By how much the operator is turned away from the robot: 0 where he faces it, π where he shows his back."""
+        x_m, y_m, _ = self.robot.at(stamps_ns)
+        operator_x_m, operator_y_m, operator_yaw_rad = self.operator.at(stamps_ns)
+        to_robot_rad = np.arctan2(y_m - operator_y_m, x_m - operator_x_m)
+        turned_rad: Float64[np.ndarray, "frames"] = np.abs(
+            (operator_yaw_rad - to_robot_rad + np.pi) % (2 * np.pi) - np.pi
+        )
+        return turned_rad
 
     def commands_at(self, stamps_ns: Int64[np.ndarray, "frames"]) -> list[MotionCommand | None]:
         """The command in force at each stamp; None where there was none, or it had run out."""

@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Final
 
 from sdt_tools.frames import Gesture, Mode
 from sdt_tools.scene.layout import AS_EVER, Behaviour, BehaviourEvent, GestureEvent, Manner
@@ -16,6 +17,8 @@ class Arms:
     manner: Manner = AS_EVER
 
 
+_TURNS_ROUND_S: Final = 1.2
+"""How long before his arms are up he begins to turn to the robot."""
 ARMS_AT_REST = Arms(Gesture.IDLE, 1.0)
 
 
@@ -50,6 +53,15 @@ def gesture_at(gestures: Sequence[GestureEvent], time_s: float) -> Gesture:
         if event.at_s <= time_s:
             return event.gesture if time_s < event.at_s + event.lasts_s else Gesture.IDLE
     return Gesture.IDLE
+
+
+def signals_at(gestures: Sequence[GestureEvent], time_s: float) -> bool:
+    """Whether the operator is at a gesture at ``time_s``: about to show it, showing it, or letting his arms sink."""
+    return any(
+        event.at_s - _TURNS_ROUND_S <= time_s < event.at_s + event.lasts_s + event.moves_s - event.lead_s
+        for event in gestures
+        if event.gesture is not Gesture.IDLE
+    )
 
 
 def first_mode(planned: Sequence[GestureEvent]) -> Mode:

@@ -175,6 +175,15 @@ class Layout:
     mask: bool | None = None
     camera: CameraKind = "plain"
 
+    def notes(self) -> dict[str, str]:
+        """What a recording says of this world beside its name: light, and surroundings and mask where they are set."""
+        told = {"light": self.light}
+        if self.surroundings is not None:
+            told["surroundings"] = self.surroundings
+        if self.mask is not None:
+            told["mask"] = "yes" if self.mask else "no"
+        return told
+
     def segments(self) -> Float64[np.ndarray, "segments 4"]:
         """Everything straight that a ray can meet: x0, y0, x1, y1 of walls, then of the boxes' sides."""
         rows = [(wall.x0_m, wall.y0_m, wall.x1_m, wall.y1_m) for wall in self.walls]

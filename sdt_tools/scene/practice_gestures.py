@@ -1,8 +1,8 @@
 """Practice gestures: an operator before the robot who signals, walks, and does what might be taken for a signal.
 
 People, rooms, light, distances and headings are drawn anew with each seed; seeds 0 to 999 are for training and tuning,
-results are reported on others. Gestures and what looks like one come at all times: standing, walking, half out of the
-picture, from 0.8 to 3.5 m off.
+results are reported on others. What looks like a gesture comes at all times, walking and turned away too; for a gesture
+he stands and faces the robot, from 0.8 to 3.5 m off, with an arm out of the picture now and then.
 """
 
 import math
@@ -36,8 +36,8 @@ from sdt_tools.scene.walker import Walker
 NAME: Final = "practice_gestures"
 _TIMEOUT_S: Final = 40.0
 _NEAR_M, _FAR_M = 0.8, 3.5
-_HALF_VIEW_RAD: Final = math.radians(36.0)
-"""Where an operator's middle may be: at the edge he is half out of the picture, whose own edge is at 40°."""
+_HALF_VIEW_RAD: Final = math.radians(30.0)
+"""Where an operator's middle may be: at the edge an arm is out of the picture, whose own edge is at 40°."""
 _ROOM_FOR_OPERATOR_M: Final = 0.27
 _TRIES: Final = 200
 
@@ -149,9 +149,9 @@ def _doings(rng: np.random.Generator) -> tuple[list[GestureEvent], list[Behaviou
         lambda at, lasts: behaviours.append(BehaviourEvent(at, Behaviour(likes[len(behaviours) % len(likes)]), lasts)),
     )
     while time_s < _TIMEOUT_S - 3.0:
-        lasts_s = rng.uniform(1.8, 4.0)
+        lasts_s = rng.uniform(2.0, 4.5)
         make[rng.choice(3, p=(0.3, 0.3, 0.4))](time_s, lasts_s)
-        time_s += lasts_s + rng.uniform(0.9, 2.5)
+        time_s += lasts_s + rng.uniform(1.2, 3.0)
     return gestures, behaviours
 
 

@@ -43,17 +43,25 @@ class Walker:
         self._spread_m = 0.0
         self._stand_by(layout.robot)
 
-    def advance(self, time_s: float, dt_s: float, robot: Pose2D, lidar: Pose2D) -> None:
-        """Live from ``time_s`` on for ``dt_s``, seeing the robot's centre and its LiDAR at these poses."""
+    @property
+    def at_end(self) -> bool:
+        """Whether he stands at the last point of his path, resting there or for good."""
+        return self._next == len(self._plan.path_m)
+
+    def advance(self, time_s: float, dt_s: float, robot: Pose2D, lidar: Pose2D, signals: bool = False) -> None:
+        """Live from ``time_s`` on for ``dt_s``, seeing the robot's centre and its LiDAR at these poses.
+
+        Who ``signals`` stands still, and turns at once to the robot that is to see it.
+        """
         rests = time_s < self._rest_until_s
         self.done = self._next == len(self._plan.path_m) and not rests
-        self.standing = rests or self.done or not self._walk(time_s, dt_s, robot, lidar)
+        self.standing = rests or self.done or signals or not self._walk(time_s, dt_s, robot, lidar)
         if not self.standing:
             self._still_s = 0.0
         else:
             self._still_s += dt_s
             self.gait_amplitude = max(0.0, self.gait_amplitude - _AMPLITUDE_PER_S * dt_s)
-            if self._still_s > _FACES_ROBOT_AFTER_S:
+            if signals or self._still_s > _FACES_ROBOT_AFTER_S:
                 x_m, y_m = self.pose.x_m, self.pose.y_m
                 self._turn_to(math.atan2(lidar.y_m - y_m, lidar.x_m - x_m) + self._plan.faces_off_rad, dt_s)
         self._stand_by(robot)

@@ -14,7 +14,7 @@ from jaxtyping import Float64
 from sdt_tools.frames import ROBOT_LENGTH_M, ROBOT_WIDTH_M, Gesture, Mode, OperatorState, Pose2D, Twist
 from sdt_tools.scene.config import PHYSICS_HZ, SceneConfig
 from sdt_tools.scene.drive import Drive
-from sdt_tools.scene.gestures import behaviour_at, commanded_mode_at, first_mode, gesture_at
+from sdt_tools.scene.gestures import behaviour_at, commanded_mode_at, first_mode, gesture_at, signals_at
 from sdt_tools.scene.layout import GestureEvent, Layout, lidar_pose
 from sdt_tools.scene.seeds import Stream, generator
 from sdt_tools.scene.sight import any_visible
@@ -75,6 +75,11 @@ class World:
     def operator_done(self) -> bool:
         """Whether he has come to the end of his path."""
         return self._walker.done
+
+    @property
+    def operator_at_end(self) -> bool:
+        """Whether he stands at the last point of his path, resting there or for good."""
+        return self._walker.at_end
 
     @property
     def operator_standing(self) -> bool:
@@ -146,7 +151,8 @@ class World:
 
     def step(self, twist: Twist) -> None:
         """Move on by 1/50 s with ``twist`` commanded to the base."""
-        self._walker.advance(self.time_s, STEP_S, self.robot, self.lidar_pose)
+        signals = signals_at(self.gestures, self.time_s)
+        self._walker.advance(self.time_s, STEP_S, self.robot, self.lidar_pose, signals)
         legs = self._walker.legs()
         for body, old, new in zip(self._legs, self.legs, legs, strict=True):
             body.velocity = ((new[0] - old[0]) / STEP_S, (new[1] - old[1]) / STEP_S)

@@ -11,6 +11,7 @@ from dataclasses import dataclass, replace
 from typing import Final
 
 from sdt_tools.clock import SECOND_NS
+from sdt_tools.emergency import EmergencyStop
 from sdt_tools.frames import MotionClass
 
 HOLD_S: Final = 0.6
@@ -91,13 +92,23 @@ def faster(state: HandState, steps: int) -> HandState:
 
 
 class Hand:
-    """The state of a hand, for those who move it and those who drive by it, each in a thread of its own."""
+    """The state of a hand, for those who move it and those who drive by it, each in a thread of its own.
 
-    def __init__(self, hold_s: float = HOLD_S, now_ns: Callable[[], int] = time.monotonic_ns) -> None:
+    Its emergency stop is ``latch``, which others may pull and hear too: the base, say, with a button of its own.
+    """
+
+    def __init__(
+        self,
+        hold_s: float = HOLD_S,
+        now_ns: Callable[[], int] = time.monotonic_ns,
+        latch: EmergencyStop | None = None,
+    ) -> None:
         self.state = HandState()
         self._hold_ns = round(hold_s * SECOND_NS)
         self._now_ns = now_ns
         self._lock = threading.Lock()
+        self._latch = EmergencyStop() if latch is None else latch
+        self._latch.tell(self._latched)
 
     @property
     def held(self) -> MotionClass | None:
@@ -122,15 +133,18 @@ class Hand:
 
     def stop_at_once(self, why: str) -> None:
         """Latch the emergency stop."""
-        self._turn(lambda state: emergency(state, why))
+        self._latch.pull(why)
 
     def release(self) -> None:
         """End the emergency stop."""
-        self._turn(released)
+        self._latch.release()
 
     def change_speed(self, steps: int) -> None:
         """Drive faster, or slower."""
         self._turn(lambda state: faster(state, steps))
+
+    def _latched(self, why: str) -> None:
+        self._turn((lambda state: emergency(state, why)) if why else released)
 
     def _turn(self, turn: Callable[[HandState], HandState]) -> None:
         with self._lock:

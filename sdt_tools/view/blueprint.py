@@ -17,13 +17,15 @@ LEGEND_LINES: Final = 10
 class Content:
     """What there is to show.
 
-    ``reach_m``: how far the scan is shown at first; ``map_bounds``: None without odometry; ``errors``: whether there
+    ``reach_m``: how far the scan is shown at first; ``pictures_first``: whether the
+    camera is given the large place, not the scan; ``map_bounds``: None without odometry; ``errors``: whether there
     are some to step through, and ``stepping``: whether the view begins at the first of them.
     """
 
     reach_m: float
     legend_lines: int = 3
     camera: bool = False
+    pictures_first: bool = False
     lanes: bool = False
     losses: bool = False
     log: bool = False
@@ -34,12 +36,11 @@ class Content:
 
 def blueprint(content: Content) -> rrb.Blueprint:
     """The layout for ``content``: space above, time below."""
-    side: list[rrb.View] = [
-        *([_camera()] if content.camera else []),
-        *([_map(content.map_bounds)] if content.map_bounds else []),
-    ]
+    scan, camera = _scan(content.reach_m), [_camera()] if content.camera else []
+    large, small = (camera[0], [scan]) if camera and content.pictures_first else (scan, camera)
+    side: list[rrb.View] = [*small, *([_map(content.map_bounds)] if content.map_bounds else [])]
     above: list[rrb.View | rrb.Container] = [
-        _scan(content.reach_m),
+        large,
         _legend(content.legend_lines),
         *([rrb.Vertical(*side)] if side else []),
     ]

@@ -1,6 +1,9 @@
-"""What was said of a recording's scans: the labels, and for each model its predictions, losses and error tags."""
+"""What was said of a recording's frames: the labels, and for each model its predictions, losses and error tags.
 
-from collections.abc import Sequence
+The frames of a follow network are scans, said to be motions; those of a vision network pictures, said to be gestures.
+"""
+
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -8,6 +11,7 @@ import polars as pl
 from jaxtyping import Float64, Int64
 
 from sdt_tools.errors import UsageError
+from sdt_tools.view import palette
 from sdt_tools.view.palette import CORRECT, ERROR, STATUSES, UNLABELED
 from sdt_tools.view.timeline import held
 
@@ -27,10 +31,13 @@ _NO_ANSWERS = pl.DataFrame(schema=_ANSWERS)
 
 @dataclass(frozen=True, eq=False)
 class Labels:
-    """Labels at the stamps of scans, in order."""
+    """Labels at the stamps of scans, or of pictures, in order."""
 
     stamps_ns: Int64[np.ndarray, "labels"]
     names: tuple[str, ...]
+
+
+NOT_LABELLED = Labels(np.empty(0, np.int64), ())
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,6 +56,11 @@ class ModelTrack:
     tags: tuple[str, ...]
 
     @property
+    def of_pictures(self) -> bool:
+        """Whether the model answers pictures."""
+        return self.predicted[0] in palette.GESTURES
+
+    @property
     def has_tags(self) -> bool:
         """Whether an error analysis says anything about this track."""
         return any(self.tags)
@@ -61,31 +73,38 @@ class ModelTrack:
         )
 
 
-def labels_of(frame: pl.DataFrame | None) -> Labels:
-    """Resolved labels (columns stamp_ns and label); what is unresolved is left out."""
+def labels_of(frame: pl.DataFrame | None, names: Collection[str]) -> Labels:
+    """Those of the resolved labels (columns stamp_ns and label) that are among ``names``."""
     if frame is None:
-        return Labels(np.empty(0, np.int64), ())
-    known = frame.select("stamp_ns", "label").filter(pl.col("label").fill_null("") != "").sort("stamp_ns")
+        return NOT_LABELLED
+    known = frame.select("stamp_ns", "label").filter(pl.col("label").is_in(list(names))).sort("stamp_ns")
     return Labels(known["stamp_ns"].to_numpy(), tuple(known["label"].to_list()))
 
 
-def labels_in(models: Sequence[ModelTrack]) -> Labels:
-    """Labels as the first model's frames carry them that has any."""
+def labels_in(models: Sequence[ModelTrack], of_pictures: bool) -> Labels:
+    """Labels of scans, or of pictures, as the frames of the first model carry them that has any."""
     for track in models:
+        if track.of_pictures is not of_pictures:
+            continue
         rows = [row for row, label in enumerate(track.labels) if label]
         if rows:
             return Labels(track.stamps_ns[np.array(rows)], tuple(track.labels[row] for row in rows))
-    return labels_of(None)
+    return NOT_LABELLED
 
 
 def models_of(
-    recording_id: str, predictions: Sequence[pl.DataFrame], tags: Sequence[pl.DataFrame], labels: Labels
+    recording_id: str,
+    predictions: Sequence[pl.DataFrame],
+    tags: Sequence[pl.DataFrame],
+    labels: Labels,
+    gestures: Labels = NOT_LABELLED,
 ) -> tuple[ModelTrack, ...]:
     """The tracks of all models over the recording ``recording_id``, in the order in which they are first given.
 
     Frames of predictions hold the columns recording_id, stamp_ns, model, label, predicted and loss_ce; those of tags
     the same key and tag, and the others too where a model is known from them alone. Rows of other recordings are passed
-    over. Where predictions were made without labels, ``labels`` take their place; the loss stays unknown.
+    over. Where predictions were made without labels, ``labels`` of scans and labelled ``gestures`` of pictures take
+    their place; the loss stays unknown.
 
     Raises UsageError where all predictions, or all tags, are about other recordings, and for an unknown tag.
     """
@@ -101,10 +120,13 @@ def models_of(
         return ()
     rows = rows.unique(KEY, keep="last", maintain_order=True)
     rows = rows.join(_tags_by_frame(tags), on=list(KEY), how="left", maintain_order="left")
-    known = pl.DataFrame(
-        {"stamp_ns": labels.stamps_ns, "given": list(labels.names)}, {"stamp_ns": pl.Int64, "given": pl.String}
+    given = {"stamp_ns": pl.Int64, "given": pl.String, "of_picture": pl.Boolean}
+    known = pl.concat(
+        pl.DataFrame({"stamp_ns": one.stamps_ns, "given": list(one.names), "of_picture": of_picture}, given)
+        for one, of_picture in ((labels, False), (gestures, True))
     )
-    rows = rows.join(known, on="stamp_ns", how="left", maintain_order="left")
+    rows = rows.with_columns(pl.col("predicted").is_in(list(palette.GESTURES)).alias("of_picture"))
+    rows = rows.join(known, on=["stamp_ns", "of_picture"], how="left", maintain_order="left")
     rows = rows.with_columns(pl.coalesce("label", "given").fill_null("").alias("label"), pl.col("tag").fill_null(""))
     return tuple(_track(frame) for frame in rows.partition_by("model", maintain_order=True))
 

@@ -13,6 +13,7 @@ SCAN_LABEL_WORDS: Final = "scan/words/label"
 CAMERA: Final = "camera"
 CAMERA_IMAGE: Final = "camera/image"
 CAMERA_GESTURE: Final = "camera/gesture"
+CAMERA_LABEL_WORDS: Final = "camera/words/label"
 
 MAP: Final = "map"
 MAP_ROBOT: Final = "map/robot"
@@ -22,10 +23,11 @@ MAP_OPERATOR_WAY: Final = "map/operator_way"
 MAP_SURROUNDINGS: Final = "map/surroundings"
 
 LANE_LABEL: Final = "label"
+LANE_GESTURE_LABEL: Final = "label/gesture"
 LANE_COMMAND: Final = "robot/command"
 LANE_MODE: Final = "robot/mode"
 LANE_GESTURE: Final = "operator/gesture"
-LANES: Final = ("label", "model/**", "operator/**", "robot/**")
+LANES: Final = ("label/**", "model/**", "operator/**", "robot/**")
 """The lanes stand in the order of their names, with the name as it is: label, model, operator, robot."""
 
 LOSS: Final = "loss"
@@ -48,6 +50,11 @@ def scan_motion(model: str) -> str:
 def scan_words(model: str) -> str:
     """The line that tells a model's answer."""
     return f"scan/words/model/{part(model)}"
+
+
+def camera_words(model: str) -> str:
+    """The line that tells a model's answer to a picture."""
+    return f"camera/words/model/{part(model)}"
 
 
 def lane_predicted(model: str) -> str:

@@ -8,7 +8,7 @@ import polars as pl
 
 from sdt_tools.errors import UsageError
 from sdt_tools.labeling.resolve import read_labels
-from sdt_tools.labeling.vocabulary import LabelKind
+from sdt_tools.labeling.vocabulary import LabelKind, journal_path
 from sdt_tools.view.decisions import KEY
 from sdt_tools.view.log import ViewSummary, write_rrd
 
@@ -26,22 +26,27 @@ def write_rrd_from_files(
     step_tags: Collection[str] = (),
     every: int = 1,
 ) -> ViewSummary:
-    """Write ``recording`` with its motion labels in ``labels_dir``, and what files say of it, to ``out``.
+    """Write ``recording`` with its labels in ``labels_dir``, and what files say of it, to ``out``.
 
     ``errors`` are folders of error analyses, or the tags files in them; errors with one of the tags ``step_tags`` (all
-    without) can be stepped through. Raises LabelError where
-    ``labels_dir`` has no journal of the recording, UsageError for a file that does not hold what it should, and what
-    ``write_rrd`` raises.
+    without) can be stepped through. Raises LabelError where ``labels_dir`` has no journal, neither of motions nor of
+    gestures, of the recording, UsageError for a file that does not hold what it should, and what ``write_rrd`` raises.
     """
     return write_rrd(
         recording,
         out,
-        labels=None if labels_dir is None else read_labels(labels_dir, recording.stem, LabelKind.MOTION),
+        labels=None if labels_dir is None else read_both_kinds(labels_dir, recording.stem),
         predictions=[read_predictions(path) for path in predictions],
         tags=[read_tags(path) for path in errors],
         step_tags=step_tags,
         every=every,
     )
+
+
+def read_both_kinds(labels_dir: Path, stem: str) -> pl.DataFrame:
+    """The resolved labels of a recording, motions and gestures. Raises LabelError where it has neither journal."""
+    kinds = [kind for kind in LabelKind if journal_path(labels_dir, stem, kind).exists()]
+    return pl.concat(read_labels(labels_dir, stem, kind) for kind in kinds or [LabelKind.MOTION])
 
 
 def read_predictions(path: Path) -> pl.DataFrame:

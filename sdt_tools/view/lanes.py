@@ -28,12 +28,21 @@ class Lane:
     colors: Mapping[str, Rgb]
 
 
-def lanes_of(tracks: Tracks, notes: Notes, labels: Labels, models: Sequence[ModelTrack]) -> list[Lane]:
+def lanes_of(
+    tracks: Tracks, notes: Notes, labels: Labels, labelled_gestures: Labels, models: Sequence[ModelTrack]
+) -> list[Lane]:
     """All lanes that have something to show."""
     commands, signals = tracks.commands, notes.signals
     command_ns = np.array([command.stamp_ns for command in commands], np.int64)
     signal_ns = np.array([signal.stamp_ns for signal in signals], np.int64)
-    lanes = [Lane(entities.LANE_LABEL, changes(labels.stamps_ns, labels.names), palette.ANSWERS)]
+    lanes = [
+        Lane(entities.LANE_LABEL, changes(labels.stamps_ns, labels.names), palette.MOTIONS),
+        Lane(
+            entities.LANE_GESTURE_LABEL,
+            changes(labelled_gestures.stamps_ns, labelled_gestures.names),
+            palette.GESTURES,
+        ),
+    ]
     for track in models:
         predicted, judged = changes(track.stamps_ns, track.predicted), judge(track)
         lanes.append(Lane(entities.lane_predicted(track.model), predicted, palette.ANSWERS))

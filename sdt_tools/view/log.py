@@ -9,6 +9,7 @@ from typing import Final
 import numpy as np
 import polars as pl
 import rerun as rr
+from jaxtyping import Int64
 
 from sdt_tools.config import MotionConfig
 from sdt_tools.errors import OutputExistsError, UsageError
@@ -21,6 +22,7 @@ from sdt_tools.view.camera_view import send_images
 from sdt_tools.view.decisions import NOTHING_JUDGED, judge
 from sdt_tools.view.error_steps import ErrorStep, numbered, scans_at, stamps_of
 from sdt_tools.view.map_view import draw_surroundings, map_bounds
+from sdt_tools.view.palette import UNLABELED
 from sdt_tools.view.rrd_file import RrdFile
 from sdt_tools.view.scan_view import send_scans, style_scans
 from sdt_tools.view.step_views import draw_at_steps
@@ -72,11 +74,11 @@ def write_rrd(
 ) -> ViewSummary:
     """Write ``recording`` with all that is known of it to ``out``, its layout inside.
 
-    ``labels`` are resolved (stamp_ns, label); ``predictions`` and ``tags`` have the columns of prediction files and of
-    tag files, of any number of models and recordings: rows of other recordings are passed over. The first model colours
-    the scans. Errors with one of the tags ``step_tags`` can be stepped through, and the view begins at the first;
-    without, all errors can, and it begins with the recording. ``every`` shows one scan in so many; ``motions`` shapes
-    the arrows.
+    ``labels`` are resolved (stamp_ns, label), of scans, of pictures, or both; ``predictions`` and ``tags`` have the
+    columns of prediction files and of tag files, of any number of models and recordings: rows of other recordings are
+    passed over. The first follow network colours the scans; what vision networks answer stands in the picture. Errors
+    with one of the tags ``step_tags`` can be stepped through, and the view begins at the first; without, all errors
+    can, and it begins with the recording. ``every`` shows one scan in so many; ``motions`` shapes the arrows.
 
     Raises OutputExistsError; UsageError for ``every`` below 1 and for predictions or tags of which none is about
     ``recording``; RecordingError where there is nothing to read; RunError where the disk does not take it all.
@@ -131,6 +133,7 @@ def _content(source: Recording, story: Story) -> Content:
         reach_m=story.scans.reach_m,
         legend_lines=len(legend(story)),
         camera=CAMERA_IMAGE in source.topics,
+        pictures_first=bool(story.models) and all(track.of_pictures for track in story.models),
         lanes=bool(story.lanes),
         losses=has_losses(story),
         log=has_log(story),
@@ -143,8 +146,8 @@ def _content(source: Recording, story: Story) -> Content:
 def _draw_scans(stream: rr.RecordingStream, source: Recording, story: Story, every: int) -> int:
     """One scan in ``every``, and those of errors; a few, spread over the recording, go into the map."""
     scan_ns, reach_m = story.scans.stamps_ns, story.scans.reach_m
-    steps_ns, steps = stamps_of(story.steps), numbered(story.steps)
-    judged = judge(story.models[0]) if story.models else NOTHING_JUDGED
+    steps_ns, steps = _scans_of_steps(story), numbered(story.steps)
+    judged = next((judge(track) for track in story.models if not track.of_pictures), NOTHING_JUDGED)
     on_map = np.unique(np.linspace(0, max(0, len(scan_ns) - 1), SCANS_ON_MAP).astype(np.int64))
     kept_ns, kept_m = [np.empty(0, np.int64)], [np.empty((0, RAYS))]
     style_scans(stream)
@@ -155,13 +158,26 @@ def _draw_scans(stream: rr.RecordingStream, source: Recording, story: Story, eve
         rows = when(batch.stamps_ns[chosen], scan_ns)
         send_scans(stream, rows, batch.ranges_m[chosen], judged.at(rows.stamps_ns), reach_m)
         found, ranges_m = scans_at(batch.stamps_ns, batch.ranges_m, steps_ns)
-        send_scans(stream, steps.at(found), ranges_m, [story.steps[step].tag for step in found.tolist()], reach_m)
+        send_scans(stream, steps.at(found), ranges_m, _colours_of_steps(story, found.tolist()), reach_m)
         kept_ns.append(batch.stamps_ns[kept])
         kept_m.append(batch.ranges_m[kept])
         seen, shown = seen + len(batch), shown + len(rows)
     robot, mount = story.tracks.robot, story.notes.mount
     draw_surroundings(stream, np.concatenate(kept_m), np.concatenate(kept_ns), robot, mount)
     return shown
+
+
+def _scans_of_steps(story: Story) -> Int64[np.ndarray, "steps"]:
+    """The stamp of the scan that goes with each step: the newest, which for a follow network is its own."""
+    stamps_ns, scan_ns = stamps_of(story.steps), story.scans.stamps_ns
+    rows = held(scan_ns, stamps_ns)
+    return np.where(rows >= 0, scan_ns[rows], -1) if len(scan_ns) else np.full(len(stamps_ns), -1)
+
+
+def _colours_of_steps(story: Story, steps: Sequence[int]) -> list[str]:
+    """What the scan of each step is coloured after: the error, where it is one of scans."""
+    of_pictures = {track.model for track in story.models if track.of_pictures}
+    return [UNLABELED if story.steps[n].model in of_pictures else story.steps[n].tag for n in steps]
 
 
 def _draw_images(stream: rr.RecordingStream, source: Recording, story: Story) -> int:

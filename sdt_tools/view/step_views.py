@@ -11,9 +11,9 @@ from sdt_tools.view.error_steps import draw_steps, numbered, stamps_of
 from sdt_tools.view.map_view import send_robot
 from sdt_tools.view.scan_view import send_motions
 from sdt_tools.view.series import send_scalars
-from sdt_tools.view.story import Story, send_operators
+from sdt_tools.view.story import Story, picture_words_of, scan_words_of, send_operators
 from sdt_tools.view.timeline import Changes, held, send
-from sdt_tools.view.words import lines_of, send_line
+from sdt_tools.view.words import send_line
 
 
 def draw_at_steps(stream: rr.RecordingStream, story: Story) -> None:
@@ -22,7 +22,7 @@ def draw_at_steps(stream: rr.RecordingStream, story: Story) -> None:
     stamps_ns, steps = stamps_of(story.steps), numbered(story.steps)
     for entity, said_ns, names in _answers(story):
         send_motions(stream, entity, steps, _held(said_ns, names, stamps_ns), story.motions, story.notes.mount)
-    for entity, said_ns, words in lines_of(story.labels, story.models):
+    for entity, said_ns, words in [*scan_words_of(story), *picture_words_of(story)]:
         send_line(stream, entity, steps, _held(said_ns, words, stamps_ns))
     for lane in story.lanes:
         send(stream, lane.entity, steps, rr.StateChange.columns(state=_state(lane.told, stamps_ns)))
@@ -31,7 +31,8 @@ def draw_at_steps(stream: rr.RecordingStream, story: Story) -> None:
         losses = np.where(rows >= 0, track.loss[np.maximum(rows, 0)], np.nan)
         send_scalars(stream, entities.loss(track.model), steps, losses)
     scans = held(story.scans.stamps_ns, stamps_ns)
-    send_scalars(stream, entities.FRONT_RANGE, steps, story.scans.front_m[np.maximum(scans, 0)])
+    seen = np.flatnonzero(scans >= 0)
+    send_scalars(stream, entities.FRONT_RANGE, steps.at(seen), story.scans.front_m[scans[seen]])
     bases = story.tracks.robot.at(stamps_ns).T if len(story.tracks.robot.stamps_ns) else np.empty((0, 3))
     known = np.isfinite(bases).all(axis=1)
     send_robot(stream, steps.at(np.flatnonzero(known)), bases[known])
@@ -41,7 +42,11 @@ def draw_at_steps(stream: rr.RecordingStream, story: Story) -> None:
 
 def _answers(story: Story) -> list[tuple[str, Int64[np.ndarray, "samples"], Sequence[str]]]:
     """What is drawn as an arrow: for each its entity, and what it says at which stamps."""
-    answers = [(entities.scan_motion(track.model), track.stamps_ns, track.predicted) for track in story.models]
+    answers = [
+        (entities.scan_motion(track.model), track.stamps_ns, track.predicted)
+        for track in story.models
+        if not track.of_pictures
+    ]
     return [(entities.SCAN_LABEL, story.labels.stamps_ns, story.labels.names), *answers]
 
 

@@ -33,8 +33,12 @@ from sdt_tools.view.scan_view import BOLD, draw_furniture, send_motions, style_m
 from sdt_tools.view.series import send_losses, send_scalars, style_sensor_series
 from sdt_tools.view.survey import Survey
 from sdt_tools.view.timeline import Rows, changes, send, when
-from sdt_tools.view.words import draw_legend, send_words
+from sdt_tools.view.words import Line, draw_legend, picture_lines, scan_lines, send_words
 
+LINE_HEIGHT: Final = 0.075
+"""Height of a line beside the scan, as a share of the reach."""
+PICTURE_LINE_HEIGHT: Final = 0.05
+"""Height of a line in the picture, as a share of its width."""
 TRUTH_NS: Final = SECOND_NS // 25
 """Poses are drawn 25 times a second at most."""
 
@@ -51,6 +55,7 @@ class Story:
     tracks: Tracks
     notes: Notes
     labels: Labels
+    labelled_gestures: Labels
     models: tuple[ModelTrack, ...]
     lanes: tuple[Lane, ...]
     motions: MotionConfig
@@ -70,21 +75,24 @@ def gather_story(
 ) -> Story:
     """Gather what ``source`` says, and what ``labels``, ``predictions`` and ``tags`` say of it.
 
-    Errors with one of the tags ``step_tags`` (all without) can be stepped through. Raises UsageError where predictions
-    or tags are given and none of them is about ``source``, and for the name of no tag.
+    ``labels`` are of scans, of pictures, or both. Errors with one of the tags ``step_tags`` (all without) can be
+    stepped through. Raises UsageError where predictions or tags are given and none of them is about ``source``, and for
+    the name of no tag.
     """
     check_tags(step_tags)
     wanted = step_tags or ERROR_TAGS
     tracks, notes = read_tracks(source), read_notes(source.messages(NOTE_TOPICS))
-    given = labels_of(labels)
-    models = models_of(source.recording_id, predictions, tags, given)
-    given = given if labels is not None else labels_in(models)
-    lanes = lanes_of(tracks, notes, given, models)
+    given, gestures = labels_of(labels, palette.MOTIONS), labels_of(labels, palette.GESTURES)
+    models = models_of(source.recording_id, predictions, tags, given, gestures)
+    if labels is None:
+        given, gestures = labels_in(models, of_pictures=False), labels_in(models, of_pictures=True)
+    lanes = lanes_of(tracks, notes, given, gestures, models)
     return Story(
         scans=scans,
         tracks=tracks,
         notes=notes,
         labels=given,
+        labelled_gestures=gestures,
         models=models,
         lanes=tuple(lanes),
         motions=motions,
@@ -104,9 +112,19 @@ def has_losses(story: Story) -> bool:
     return any(bool(np.isfinite(track.loss).any()) for track in story.models)
 
 
+def scan_words_of(story: Story) -> list[Line]:
+    """What is said beside the scan."""
+    return scan_lines(story.labels, story.models)
+
+
+def picture_words_of(story: Story) -> list[Line]:
+    """What is said in the picture."""
+    return picture_lines(story.labelled_gestures, story.models)
+
+
 def legend(story: Story) -> dict[str, Rgb]:
     """The colours that occur, by what they stand for."""
-    statuses = {status for track in story.models for status in track.statuses()}
+    statuses = {status for track in story.models if not track.of_pictures for status in track.statuses()}
     entries = {f"scan: {name}": color for name, color in palette.STATUSES.items() if name in statuses}
     if not statuses:
         entries["scan"] = palette.STATUSES[palette.UNLABELED]
@@ -123,7 +141,10 @@ def draw_story(stream: rr.RecordingStream, story: Story) -> None:
     stamps_ns = story.scans.stamps_ns
     draw_furniture(stream, story.notes.mount, story.scans.reach_m)
     draw_legend(stream, legend(story))
-    send_words(stream, story.labels, story.models, story.scans.reach_m, stamps_ns)
+    reach_m, width_px = story.scans.reach_m, story.notes.image_width_px
+    send_words(stream, scan_words_of(story), (-0.7 * reach_m, -0.96 * reach_m), LINE_HEIGHT * reach_m, stamps_ns)
+    below_truth = (0.5 * width_px, 12.0 + PICTURE_LINE_HEIGHT * width_px)
+    send_words(stream, picture_words_of(story), below_truth, PICTURE_LINE_HEIGHT * width_px, stamps_ns)
     send_lanes(stream, story.lanes, stamps_ns)
     send_losses(stream, story.models, stamps_ns)
     _draw_curves(stream, story)
@@ -146,6 +167,8 @@ def _draw_motions(stream: rr.RecordingStream, story: Story) -> None:
     """The arrows: the label broad and below, the models in their order on top of it."""
     arrows = [(entities.SCAN_LABEL, story.labels.stamps_ns, story.labels.names, palette.LABEL, 2.0 * BOLD)]
     for number, track in enumerate(story.models):
+        if track.of_pictures:
+            continue
         entity = entities.scan_motion(track.model)
         arrows.append((entity, track.stamps_ns, track.predicted, palette.model_color(number), BOLD))
     for order, (entity, stamps_ns, names, color, radius) in enumerate(arrows):

@@ -1,7 +1,6 @@
-"""Words in the views: the state of the moment beside the scan, and the legend."""
+"""Words in the views: the state of the moment beside the scan and in the picture, and the legend."""
 
 from collections.abc import Mapping, Sequence
-from typing import Final
 
 import numpy as np
 import rerun as rr
@@ -12,32 +11,43 @@ from sdt_tools.view.decisions import Labels, ModelTrack
 from sdt_tools.view.palette import Rgb
 from sdt_tools.view.timeline import Rows, changes, send, when
 
-LINE_HEIGHT: Final = 0.075
-"""Height of a line beside the scan, as a share of the reach."""
+Line = tuple[str, Int64[np.ndarray, "_"], list[str]]
+"""A line of words: its entity, and what it says at which stamps."""
 
 
 def send_words(
     stream: rr.RecordingStream,
-    labels: Labels,
-    models: Sequence[ModelTrack],
-    reach_m: float,
+    lines: Sequence[Line],
+    place: tuple[float, float],
+    height: float,
     scan_stamps_ns: Int64[np.ndarray, "scans"],
 ) -> None:
-    """The label and each model's answer of the moment, one below the other at the top left of the scan."""
-    for number, (entity, stamps_ns, words) in enumerate(lines_of(labels, models)):
-        place = [[-0.7 * reach_m, (-0.96 + LINE_HEIGHT * number) * reach_m]]
+    """Lines over time, one ``height`` below the other, the first at ``place``."""
+    for number, (entity, stamps_ns, words) in enumerate(lines):
         told = changes(stamps_ns, words)
-        style = rr.Points2D.from_fields(positions=place, radii=-0.1, show_labels=True, draw_order=20.0)
+        at = [[place[0], place[1] + height * number]]
+        style = rr.Points2D.from_fields(positions=at, radii=-0.1, show_labels=True, draw_order=20.0)
         stream.log(entity, style, static=True, strict=True)
         send_line(stream, entity, when(told.stamps_ns, scan_stamps_ns), told.states)
 
 
-def lines_of(labels: Labels, models: Sequence[ModelTrack]) -> list[tuple[str, Int64[np.ndarray, "samples"], list[str]]]:
-    """The lines: for each its entity, and what it says at which stamps."""
-    lines: list[tuple[str, Int64[np.ndarray, "samples"], list[str]]] = []
+def scan_lines(labels: Labels, models: Sequence[ModelTrack]) -> list[Line]:
+    """The label of scans and each follow network's answer of the moment."""
+    told = [(entities.scan_words(track.model), track) for track in models if not track.of_pictures]
+    return _lines(entities.SCAN_LABEL_WORDS, labels, told)
+
+
+def picture_lines(labels: Labels, models: Sequence[ModelTrack]) -> list[Line]:
+    """The label of pictures and each vision network's answer of the moment."""
+    told = [(entities.camera_words(track.model), track) for track in models if track.of_pictures]
+    return _lines(entities.CAMERA_LABEL_WORDS, labels, told)
+
+
+def _lines(label_entity: str, labels: Labels, models: Sequence[tuple[str, ModelTrack]]) -> list[Line]:
+    lines: list[Line] = []
     if labels.names:
-        lines.append((entities.SCAN_LABEL_WORDS, labels.stamps_ns, [f"label: {name}" for name in labels.names]))
-    return lines + [(entities.scan_words(track.model), track.stamps_ns, _answers(track)) for track in models]
+        lines.append((label_entity, labels.stamps_ns, [f"label: {name}" for name in labels.names]))
+    return lines + [(entity, track.stamps_ns, _answers(track)) for entity, track in models]
 
 
 def send_line(stream: rr.RecordingStream, entity: str, rows: Rows, words: Sequence[str]) -> None:

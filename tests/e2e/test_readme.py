@@ -36,6 +36,8 @@ SMALLER = {
     "--out analysis/my_vision": "--out analysis/my_vision --epochs 1 --width 64 --height 48",
     "--out analysis/my_careful_vision": "--out analysis/my_careful_vision --epochs 1 --width 64 --height 48",
     "analysis/my_vision analysis/gestures": "analysis/my_vision analysis/gestures --images 6 --steps 1",
+    "--record recordings/summoned.mcap": "--record recordings/summoned.mcap --seconds 2 --fast",
+    "my_careful_vision --follow": "my_careful_vision --scenario summoned_plain --seeds 1000 --follow",
     "--seeds 1000-1019": "--seeds 1000-1001",
     "--out analysis/my_certified\n": "--out analysis/my_certified --epochs 2 --delta 1000\n",
     "--export analysis/my_certified_onnx": "--export analysis/my_certified_onnx --restarts 1 --steps 1",
@@ -65,7 +67,7 @@ def workplace(tmp_path: Path) -> Path:
 
 
 def test_the_commands_run_in_the_order_they_are_given(workplace: Path) -> None:
-    assert len(blocks()) == 12
+    assert len(blocks()) == 13
     script = "".join(blocks())
     for said, small in SMALLER.items():
         script = script.replace(said, small)

@@ -57,7 +57,8 @@ def claims_markdown(verdicts: Sequence[ClaimVerdict], summary: Mapping[str, Any]
         value = one.estimate.text()
         cells = (one.statement, one.about, f"**{one.finding}**", one.reason, one.measure, value, support)
         lines.append(f"| {' | '.join(cell.replace('|', '/') for cell in cells)} |")
-    lines += ["", "## Premises", "", "| claim | about | premise | holds | measured |", "|---|---|---|---|---|"]
+    if any(one.premises for one in verdicts):
+        lines += ["", "## Premises", "", "| claim | about | premise | holds | measured |", "|---|---|---|---|---|"]
     for one in verdicts:
         for premise in one.premises:
             holds = {True: "yes", False: "**no**", None: "not known"}[premise.holds]

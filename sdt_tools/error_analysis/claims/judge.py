@@ -3,7 +3,7 @@
 import json
 import os
 import shutil
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
@@ -17,7 +17,7 @@ from sdt_tools.error_analysis.claims.document import claims_markdown, claims_tab
 from sdt_tools.error_analysis.claims.figures import draw_claims
 from sdt_tools.error_analysis.claims.implication import judge_implication
 from sdt_tools.error_analysis.claims.locality import Correlogram, correlogram
-from sdt_tools.error_analysis.claims.material import Material, gather, read_network
+from sdt_tools.error_analysis.claims.material import Material, Network, gather, read_network
 from sdt_tools.error_analysis.claims.nested import judge_nested_frames, judge_nested_scenarios, runs_of
 from sdt_tools.error_analysis.claims.options import ClaimOptions
 from sdt_tools.error_analysis.claims.premises import situations_sample
@@ -33,13 +33,16 @@ from sdt_tools.error_analysis.claims.propositions import (
 )
 from sdt_tools.error_analysis.claims.theorem import judge_theorem
 from sdt_tools.error_analysis.claims.verdict import ClaimVerdict, undecided
-from sdt_tools.error_analysis.distance import estimate_epsilon
+from sdt_tools.error_analysis.epsilon import estimate_epsilon
 from sdt_tools.error_analysis.recorded import find_recordings, read_situations
 from sdt_tools.error_analysis.side_by_side import KEYS, load_side_by_side
+from sdt_tools.error_analysis.spaces import scan_space
 from sdt_tools.errors import OutputExistsError, UsageError
 from sdt_tools.frames import MAX_RANGE_M, MotionClass
 from sdt_tools.models.checkpoint import load_checkpoint
+from sdt_tools.models.checkpoint_folder import VISION_KIND
 from sdt_tools.recording.incomplete import Incomplete
+from sdt_tools.replay.predictions import PredictionKind, kind_of, scan_predictions
 from sdt_tools.runs.code import code_version
 from sdt_tools.runs.local import Progress
 from sdt_tools.runs.unit import content_hash
@@ -88,6 +91,8 @@ class ClaimReport:
 def judge_claims(sources: Sources, options: ClaimOptions, out: Path, progress: Progress | None = None) -> ClaimReport:
     """Judge every claim and write the folder ``out``: claims.json, claims.parquet, claims.md and the pictures.
 
+    Of vision networks, whose predictions are answers to pictures, there are the two claims about adversarial training.
+
     Raises UsageError for predictions that do not fit together or with the models, CheckpointError, RecordingError,
     OutputExistsError.
     """
@@ -96,15 +101,14 @@ def judge_claims(sources: Sources, options: ClaimOptions, out: Path, progress: P
     if not sources.models:
         raise UsageError("no checkpoint given; name those that made the predictions with --model")
     networks = {folder: read_network(folder) for folder in sources.models}
+    kind = kind_of(scan_predictions(sources.predictions).collect_schema().names())
+    _check_kind(networks.values(), kind)
     by_name = {network.name: network for network in networks.values()}
     if len(by_name) < len(networks):
         raise UsageError("two checkpoints have the same name, by which predictions tell them; rename one")
     frames = load_side_by_side(sources.predictions, tuple(by_name))
     material = gather(list(networks.values()), frames, options)
     tags = _read_tags(sources.tags)
-    runs = _read_runs(sources.evaluations)
-    scans, incomplete = _read_scans(material, sources.recordings, options, progress)
-    locality = None if scans is None else _locality(material, scans, options)
     adversarial = tuple(
         dict.fromkeys((*sources.adversarial, *(one.name for one in material.networks if one.adversarial)))
     )
@@ -113,6 +117,14 @@ def judge_claims(sources: Sources, options: ClaimOptions, out: Path, progress: P
             raise UsageError(
                 f"--adversarial {name}: no predictions of such a model; there are {', '.join(frames.models)}"
             )
+    of_errors = judge_adversarial(frames, adversarial, tags, options)
+    if kind is PredictionKind.PICTURES:
+        report = ClaimReport(tuple(of_errors), _summary(material), options, ())
+        _write(report, None, sources, out)
+        return report
+    runs = _read_runs(sources.evaluations)
+    scans, incomplete = _read_scans(material, sources.recordings, options, progress)
+    locality = None if scans is None else _locality(material, scans, options)
     verdicts = (
         *judge_theorem(material, sources.predictions, locality, options),
         *judge_implication(material, locality, options),
@@ -120,12 +132,19 @@ def judge_claims(sources: Sources, options: ClaimOptions, out: Path, progress: P
         *judge_nested_frames(material, options),
         *judge_conditional(material, tags, options, progress),
         *judge_forward(material, options),
-        *judge_adversarial(frames, adversarial, tags, options),
+        *of_errors,
         *_judge_propositions(material, scans, options),
     )
     report = ClaimReport(verdicts, _summary(material), options, incomplete)
     _write(report, locality, sources, out)
     return report
+
+
+def _check_kind(networks: Iterable[Network], kind: PredictionKind) -> None:
+    """Raises UsageError for a network that cannot have made predictions of ``kind``."""
+    for network in networks:
+        if (network.kind == VISION_KIND) is not (kind is PredictionKind.PICTURES):
+            raise UsageError(f"{network.folder}: cannot have made these predictions, which are answers to {kind}")
 
 
 def _read_tags(places: Sequence[Path]) -> dict[str, pl.DataFrame]:
@@ -195,13 +214,13 @@ def _judge_propositions(
         missing = [undecided(claim, network.name, STATEMENTS[claim], NO_SCANS) for claim in (PROPOSITION_1, TRANSIENT)]
         return [*missing, systematic]
     situations = np.minimum(scans, np.float32(options.errors.clip_m))
-    epsilon = estimate_epsilon(situations, frames.recording, frames.stamp_ns, options.errors)
+    epsilon = estimate_epsilon(scan_space(situations), frames.recording, frames.stamp_ns, options.errors)
     places = {motion.label: int(motion) for motion in MotionClass}
     labels = np.array([places[label] for label in frames.table["label"]])
     loaded = load_checkpoint(network.folder)
     return [
         judge_proposition_1(loaded.network, network.name, scans, labels, options),
-        judge_transients(frames, network.name, situations, epsilon.epsilon_m, options),
+        judge_transients(frames, network.name, situations, epsilon.value, options),
         systematic,
     ]
 

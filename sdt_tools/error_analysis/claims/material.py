@@ -16,7 +16,9 @@ from sdt_tools.error_analysis.resampling import draw_units, sum_by_unit
 from sdt_tools.error_analysis.side_by_side import KEYS, SideBySide
 from sdt_tools.errors import UsageError
 from sdt_tools.frames import MotionClass
+from sdt_tools.models.card import VisionCard
 from sdt_tools.models.checkpoint import load_checkpoint
+from sdt_tools.models.checkpoint_folder import VISION_KIND, kind_in, read_card
 from sdt_tools.replay.predictions import scan_predictions
 from sdt_tools.robustness.domains import NOT_FORWARD
 
@@ -29,7 +31,7 @@ class Network:
     """What a checkpoint says of its training; None where it does not.
 
     ``level`` is the safety level it was held to, 0 for none, None for domains of another kind; ``adversarial`` where
-    those were balls around the training samples.
+    those were balls around the training samples, or a vision network was trained against attacks.
     ``delta`` is the δ asked for and ``bound`` the largest worst-case loss of a domain at the end; ``train_loss`` the
     cross-entropy on the training data at the end, in nats.
     """
@@ -124,7 +126,9 @@ def gather(networks: Sequence[Network], frames: SideBySide, options: ClaimOption
 
 
 def read_network(folder: Path) -> Network:
-    """What the checkpoint in ``folder`` says of itself. Raises CheckpointError."""
+    """What the checkpoint in ``folder`` says of itself, of a follow or a vision network. Raises CheckpointError."""
+    if kind_in(folder) == VISION_KIND:
+        return _read_vision_network(folder)
     card = load_checkpoint(folder).card
     safety = card.training.get("safety")
     level = int(_number(card.training.get("level")) or 0)
@@ -140,6 +144,23 @@ def read_network(folder: Path) -> Network:
         folder=folder,
         delta=_number(safety.get("delta")) if isinstance(safety, dict) and (level or other) else None,
         bound=_number(card.metrics.get("bound")),
+        train_loss=_last_train_loss(curve) if curve.is_file() else None,
+    )
+
+
+def _read_vision_network(folder: Path) -> Network:
+    card = read_card(folder, VisionCard, (VISION_KIND,))
+    attacked = card.training.get("adversarial")
+    curve = folder / _CURVE
+    return Network(
+        name=folder.resolve().name,
+        kind=card.kind,
+        level=None,
+        adversarial=isinstance(attacked, dict) and (_number(attacked.get("epsilon")) or 0.0) > 0.0,
+        seed=card.seed,
+        folder=folder,
+        delta=None,
+        bound=None,
         train_loss=_last_train_loss(curve) if curve.is_file() else None,
     )
 

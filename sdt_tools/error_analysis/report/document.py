@@ -7,10 +7,11 @@ import numpy as np
 
 from sdt_tools.error_analysis.conditions.confirmation import Verdict
 from sdt_tools.error_analysis.definitions import ErrorOptions, Tag
-from sdt_tools.error_analysis.distance import Epsilon
+from sdt_tools.error_analysis.epsilon import Epsilon
 from sdt_tools.error_analysis.explain import Explanation
 from sdt_tools.error_analysis.labelled import LabelledFrames
 from sdt_tools.recording.incomplete import Incomplete
+from sdt_tools.replay.predictions import PredictionKind
 from sdt_tools.statistics import wilson
 
 
@@ -46,6 +47,7 @@ class ErrorReport:
     """
 
     model: str
+    kind: PredictionKind
     recordings: int
     frames: int
     errors: int
@@ -65,6 +67,7 @@ class ErrorReport:
         """The report as JSON-ready values."""
         return {
             "model": self.model,
+            "kind": str(self.kind),
             "recordings": self.recordings,
             "frames": self.frames,
             "errors": self.errors,
@@ -78,7 +81,7 @@ class ErrorReport:
             "condition_note": self.note,
             "features": list(self.features),
             "features_unavailable": list(self.unavailable),
-            "epsilon_m": self.epsilon.epsilon_m,
+            "epsilon_m": self.epsilon.value if self.epsilon.measure.neighbourhood == "scan" else None,
             "epsilon": _epsilon_document(self.epsilon),
             "options": self.options.model_dump(mode="json"),
             "warnings": list(self.warnings),
@@ -95,6 +98,7 @@ def summarise(
     total = len(frames.loss)
     return ErrorReport(
         model=str(frames.table["model"][0]),
+        kind=frames.kind,
         recordings=frames.recordings,
         frames=total,
         errors=int(frames.wrong.sum()),
@@ -119,8 +123,8 @@ def _warnings(frames: LabelledFrames, explanation: Explanation) -> list[str]:
     warnings = [explanation.epsilon.warning] if explanation.epsilon.warning else []
     if frames.wrong.any() and not explanation.tagged.neighbours[frames.wrong].any():
         warnings.append(
-            f"no error frame has a neighbour within ε = {explanation.epsilon.epsilon_m:.3g} m, so none is transient; "
-            "a larger epsilon_m or denser labels would tell"
+            f"no error frame has a neighbour within ε = {explanation.epsilon.text}, so none is transient; "
+            f"a larger {explanation.epsilon.measure.option} or denser labels would tell"
         )
     return warnings
 
@@ -144,15 +148,17 @@ def _verdict_document(verdict: Verdict) -> dict[str, object]:
 
 
 def _epsilon_document(epsilon: Epsilon) -> dict[str, object]:
-    limit_m = epsilon.unrelated_limit_m
     return {
+        "value": epsilon.value,
+        "neighbourhood": epsilon.measure.neighbourhood,
+        "unit": epsilon.measure.unit,
         "source": epsilon.source,
-        "successive_within": _within(epsilon.successive_m, epsilon.epsilon_m),
-        "unrelated_within": _within(epsilon.unrelated_m, epsilon.epsilon_m),
-        "unrelated_percentile_1_m": limit_m,
+        "successive_within": _within(epsilon.successive, epsilon.value),
+        "unrelated_within": _within(epsilon.unrelated, epsilon.value),
+        "unrelated_percentile_1": epsilon.unrelated_limit,
     }
 
 
-def _within(distances_m: np.ndarray, epsilon_m: float) -> float | None:
+def _within(distances: np.ndarray, epsilon: float) -> float | None:
     """Share of distances up to ε; None without any."""
-    return float(np.mean(distances_m <= epsilon_m)) if distances_m.size else None
+    return float(np.mean(distances <= epsilon)) if distances.size else None

@@ -17,7 +17,7 @@ from matplotlib.figure import Figure
 
 from sdt_tools.error_analysis.conditions.predicates import Predicate
 from sdt_tools.error_analysis.definitions import ERROR_TAGS, Tag
-from sdt_tools.error_analysis.distance import Epsilon
+from sdt_tools.error_analysis.epsilon import Epsilon
 from sdt_tools.error_analysis.report.document import ErrorReport
 
 TAG_COLOURS: Final = {
@@ -54,20 +54,20 @@ def as_svg(figure: Figure, name: str) -> str:
 def epsilon_figure(epsilon: Epsilon) -> Figure:
     """Distances between successive and between unrelated frames, and where ε lies between them."""
     figure, axes = _new(7.2, 3.6)
-    shown = np.concatenate([epsilon.successive_m, epsilon.unrelated_m, [epsilon.epsilon_m]])
+    shown = np.concatenate([epsilon.successive, epsilon.unrelated, [epsilon.value]])
     positive = shown[shown > 0]
     bins = np.geomspace(positive.min() * 0.9, positive.max() * 1.1, 60).tolist()
     for distances, colour, name in (
-        (epsilon.successive_m, "#2a6fbb", "successive frames"),
-        (epsilon.unrelated_m, "#8a8f98", "unrelated frames"),
+        (epsilon.successive, "#2a6fbb", "successive frames"),
+        (epsilon.unrelated, "#8a8f98", "unrelated frames"),
     ):
         if distances.size:
             weights = np.full(distances.size, 100.0 / distances.size)
-            within = np.mean(distances <= epsilon.epsilon_m)
+            within = np.mean(distances <= epsilon.value)
             axes.hist(distances, bins, weights=weights, color=colour, alpha=0.7, label=f"{name}: {within:.1%} within ε")
-    axes.axvline(epsilon.epsilon_m, color="#c62828", linewidth=2, label=f"ε = {epsilon.epsilon_m:.3g} m")
+    axes.axvline(epsilon.value, color="#c62828", linewidth=2, label=f"ε = {epsilon.text}")
     axes.set_xscale("log")
-    axes.set_xlabel("distance, root mean square per ray (m)")
+    axes.set_xlabel(epsilon.measure.distance)
     axes.set_ylabel("share of pairs (%)")
     axes.set_title(f"ε: {epsilon.source}", fontsize=10)
     axes.legend(frameon=False, fontsize=9)

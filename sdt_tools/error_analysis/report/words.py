@@ -13,11 +13,22 @@ _NUMBERS: Final = {
     "speed_mps": ("the robot's speed is", "m/s", "", 1.0),
     "distance_level_3_m": ("the scan is", "m", "from the nearest safety domain of level 3", 1.0),
     "domain_distance_m": ("the scan is", "m", "from the nearest safety domain", 1.0),
+    "operator_turned_rad": ("the operator is turned", "°", "away from the robot", 57.29577951308232),
+    "arms_changed_s": ("the nearest change of what the arms do is", "s", "away", 1.0),
+    "brightness": ("the picture's mean grey is", "of 255", "", 1.0),
+    "contrast": ("the spread of the picture's grey is", "of 255", "", 1.0),
+    "blown_share": ("of the picture's pixels", "%", "are blown out", 100.0),
+    "sharpness": ("the picture's sharpness is", "", "", 1.0),
+    "|turn_radps|": ("the robot turns by", "°/s", "", 57.29577951308232),
     "invalid_share": ("of the rays", "%", "have no distance", 100.0),
 }
 """Feature: what stands before the bound, its unit, what stands after it, and what the value is multiplied by."""
+_SHARES: Final = ("invalid_share", "blown_share")
+"""Of these the bound is said first."""
 _NAMES: Final = {
     "motion": "the right answer is {}",
+    "gesture": "the right answer is {}",
+    "surroundings": "the surroundings are {}",
     "mode": "the robot is {}",
     "scenario": "the scenario is {}",
     "light": "the light is {}",
@@ -46,12 +57,21 @@ def _predicate_in_words(predicate: Predicate) -> str:
         if feature.startswith("in_level_"):
             where = "inside a" if predicate.names == ("true",) else "outside every"
             return f"the scan lies {where} safety domain of level {feature.removeprefix('in_level_')}"
+        if feature == "mask":
+            return f"the operator wears {'a' if predicate.names == ('true',) else 'no'} mask"
+        if feature == "behaviour":
+            return f"the hands do {_behaviours(predicate.names)}"
         names = " or ".join(name.replace("_", " ") for name in predicate.names)
         return _NAMES[feature].format(names) if feature in _NAMES else predicate.text
     if feature not in _NUMBERS:
         return predicate.text
     before, unit, after, scale = _NUMBERS[feature]
     than = "less than" if predicate.operator == "<" else "at least"
-    bound = f"{than} {predicate.bound * scale:.3g}{'' if unit == '°' else ' '}{unit}"
-    words = (bound, before, after) if feature == "invalid_share" else (before, bound, after)
+    bound = f"{than} {predicate.bound * scale:.3g}{'' if unit.startswith('°') else ' '}{unit}"
+    words = (bound, before, after) if feature in _SHARES else (before, bound, after)
     return " ".join(word for word in words if word)
+
+
+def _behaviours(names: tuple[str, ...]) -> str:
+    """As in ``phone call or nothing else``."""
+    return " or ".join("nothing else" if name == "none" else name.replace("_", " ") for name in names)

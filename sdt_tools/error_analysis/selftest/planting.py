@@ -16,11 +16,11 @@ from jaxtyping import Bool, Float32, Int64, Shaped
 
 from sdt_tools.error_analysis.conditions.predicates import Features, features_of
 from sdt_tools.error_analysis.definitions import ErrorOptions, Tag
-from sdt_tools.error_analysis.distance import estimate_epsilon
+from sdt_tools.error_analysis.epsilon import estimate_epsilon
 from sdt_tools.error_analysis.labelled import LabelledFrames
-from sdt_tools.error_analysis.neighbours import NeighbourIndex, build_index, count_neighbours
 from sdt_tools.error_analysis.selftest.chance import sticky_uniforms
 from sdt_tools.error_analysis.selftest.planted_conditions import PlantedCondition, choose_conditions, error_rate
+from sdt_tools.error_analysis.spaces import VectorSpace, scan_space
 
 
 class Kind(StrEnum):
@@ -62,18 +62,18 @@ class Ground:
     """Frames without errors, and their neighbourhoods, to plant into."""
 
     frames: LabelledFrames
-    scans: Float32[np.ndarray, "frames rays"]
+    space: VectorSpace
     features: Features
-    index: NeighbourIndex
     epsilon_m: float
     options: ErrorOptions
 
 
 def ground_of(frames: LabelledFrames, scans: Float32[np.ndarray, "frames rays"], options: ErrorOptions) -> Ground:
     """Prepare ``frames`` (all right), whose situations are ``scans``."""
-    epsilon = estimate_epsilon(scans, frames.recording, frames.stamp_ns, options)
+    space = scan_space(scans)
+    epsilon = estimate_epsilon(space, frames.recording, frames.stamp_ns, options)
     features = features_of(frames.table, options.conditions.features)
-    return Ground(frames, scans, features, build_index(scans), epsilon.epsilon_m, options)
+    return Ground(frames, space, features, epsilon.value, options)
 
 
 @dataclass(frozen=True, eq=False)
@@ -158,7 +158,7 @@ def _with_isolated(ground: Ground, planted: Planted, rng: np.random.Generator) -
     kind = planted.kind.copy()
     rows = rng.permutation(len(kind))[:SEARCHED_FRAMES]
     everything = np.ones((1, len(kind)), bool)
-    lonely = rows[count_neighbours(ground.index, rows, ground.epsilon_m, everything)[0] == 0]
+    lonely = rows[ground.space.count(rows, ground.epsilon_m, everything)[0] == 0]
     chosen = _lone(ground, planted, lonely)[: max(1, round(ISOLATED_SHARE * len(kind)))]
     kind[chosen] = Kind.ISOLATED
     return Planted(kind, planted.conditions)
@@ -171,7 +171,7 @@ def _with_transient(ground: Ground, planted: Planted, rng: np.random.Generator) 
     errors = planted.wrong
     errors[chosen] = True
     groups = np.vstack([np.ones(len(kind), bool), errors])
-    neighbours, wrong_neighbours = count_neighbours(ground.index, chosen, ground.epsilon_m, groups)
+    neighbours, wrong_neighbours = ground.space.count(chosen, ground.epsilon_m, groups)
     kind[chosen[(neighbours > 0) & (wrong_neighbours == 0)]] = Kind.TRANSIENT
     return Planted(kind, planted.conditions)
 

@@ -14,6 +14,8 @@ from sdt_tools.error_analysis.recorded import find_recordings, read_situations
 from sdt_tools.error_analysis.selftest.chance import NULLS
 from sdt_tools.error_analysis.selftest.material import Material, keep
 from sdt_tools.error_analysis.selftest.trials import OUTCOME, condition_trial, null_trial, tag_trial
+from sdt_tools.errors import UsageError
+from sdt_tools.replay.predictions import PredictionKind
 from sdt_tools.runs.local import Progress, run_units
 from sdt_tools.runs.unit import Unit
 
@@ -155,6 +157,8 @@ def keep_predictions(
     Raises UsageError and RecordingError as an analysis of them does.
     """
     frames = load_labelled(predictions, options, model)
+    if frames.kind is not PredictionKind.SCANS:
+        raise UsageError(f"{predictions}: answers to pictures; errors are planted into those to scans")
     scans, _ = read_situations(frames, find_recordings(frames, recordings), options, progress)
     return keep(frames, scans, folder)
 

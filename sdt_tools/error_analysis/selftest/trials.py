@@ -140,7 +140,7 @@ def _is_false(inside: Bool[np.ndarray, "frames"], planted: Bool[np.ndarray, "fra
 
 def _tag_counts(ground: Ground, planted: Planted) -> dict[Kind, dict[str, int]]:
     frames = with_errors(ground.frames.table, planted.wrong, ground.options)
-    tags = np.array(explain(frames, ground.scans, ground.options).tagged.tag)
+    tags = np.array(explain(frames, ground.space, ground.options).tagged.tag)
     counts = {}
     for kind, tag in EXPECTED_TAG.items():
         meant, said_so = planted.kind == kind, tags == tag

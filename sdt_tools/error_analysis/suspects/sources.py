@@ -15,7 +15,7 @@ from sdt_tools.dataset.load import load_dataset
 from sdt_tools.error_analysis.suspects.options import SuspectOptions
 from sdt_tools.errors import UsageError
 from sdt_tools.frames import MotionClass
-from sdt_tools.replay.predictions import scan_predictions
+from sdt_tools.replay.predictions import PredictionKind, kind_of, scan_predictions
 from sdt_tools.runs.local import Progress
 
 
@@ -78,6 +78,8 @@ def judged_by_predictions(paths: Sequence[Path], model: str | None = None) -> Ju
     """
     rows = scan_predictions(paths).filter(pl.col("label").is_not_null())
     where = ", ".join(map(str, paths))
+    if kind_of(rows.collect_schema().names()) is not PredictionKind.SCANS:
+        raise UsageError(f"{where}: answers to pictures; wrong labels are looked for among those of scans")
     models = rows.select(pl.col("model").unique().sort()).collect()["model"].to_list()
     if not models:
         raise UsageError(f"{where}: none of the frames has a label; replay with --labels")

@@ -37,13 +37,27 @@ class LoadedVisionModel:
 
     def predict_logits(self, images_u8: UInt8[np.ndarray, "images height width 3"]) -> Float32[np.ndarray, "images 3"]:
         """Logits for images as ``pixels`` makes them, in the order of ``Gesture``."""
-        return self._run(LOGITS, images_u8, len(Gesture))
+        logits, _ = self.answer(images_u8)
+        return logits
 
     def predict_features(
         self, images_u8: UInt8[np.ndarray, "images height width 3"]
     ) -> Float32[np.ndarray, "images features"]:
         """What the classifier sees of images as ``pixels`` makes them: places in feature space."""
-        return self._run(FEATURES, images_u8, self.card.architecture.features)
+        _, features = self.answer(images_u8)
+        return features
+
+    def answer(
+        self, images_u8: UInt8[np.ndarray, "images height width 3"]
+    ) -> tuple[Float32[np.ndarray, "images 3"], Float32[np.ndarray, "images features"]]:
+        """Logits and features at once: one is on the way to the other."""
+        logits = np.empty((len(images_u8), len(Gesture)), np.float32)
+        features = np.empty((len(images_u8), self.card.architecture.features), np.float32)
+        for start in range(0, len(images_u8), _BATCH):
+            part = slice(start, start + _BATCH)
+            asked = np.ascontiguousarray(images_u8[part].transpose(0, 3, 1, 2), np.float32)
+            logits[part], features[part] = self.session.run([LOGITS, FEATURES], {INPUT: asked})
+        return logits, features
 
     def pixels(self, picture_bgr_u8: UInt8[np.ndarray, "rows columns *colours"]) -> UInt8[np.ndarray, "height width 3"]:
         """A picture in blue, green, red (or grey), of any size, as the network sees it: red, green, blue."""
@@ -57,15 +71,6 @@ class LoadedVisionModel:
     def decide(self, data: bytes) -> Gesture:
         """The gesture in one compressed picture. Raises RecordingError for one that cannot be decoded."""
         return Gesture(int(self.read(data).argmax()))
-
-    def _run(
-        self, output: str, images_u8: UInt8[np.ndarray, "images height width 3"], width: int
-    ) -> Float32[np.ndarray, "images numbers"]:
-        answers = np.empty((len(images_u8), width), np.float32)
-        for start in range(0, len(images_u8), _BATCH):
-            asked = np.ascontiguousarray(images_u8[start : start + _BATCH].transpose(0, 3, 1, 2), np.float32)
-            answers[start : start + _BATCH] = self.session.run([output], {INPUT: asked})[0]
-        return answers
 
 
 def ready_to_answer(name: str, network: VisionNet, card: VisionCard) -> LoadedVisionModel:

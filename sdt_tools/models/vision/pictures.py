@@ -5,9 +5,10 @@ Attacks count their steps on these pixels: red, green, blue in 8 bits, after res
 
 import cv2
 import numpy as np
+import simplejpeg
 from jaxtyping import UInt8
 
-from sdt_tools.dataset.pictures import breaks_off
+from sdt_tools.dataset.pictures import is_jpeg
 from sdt_tools.errors import RecordingError
 from sdt_tools.models.vision.config import ImagePreprocessConfig
 
@@ -15,10 +16,13 @@ from sdt_tools.models.vision.config import ImagePreprocessConfig
 def decode_picture(data: bytes) -> UInt8[np.ndarray, "height width 3"]:
     """A compressed picture as blue, green, red; a grey one has three equal colours.
 
-    Raises RecordingError for one that cannot be decoded or, as a JPEG, breaks off: decoders would fill it up with grey.
+    Raises RecordingError for one that cannot be decoded or, as a JPEG, is damaged: most decoders would fill it up.
     """
-    if breaks_off(data):
-        raise RecordingError(f"a JPEG picture of {len(data)} bytes that breaks off before its end")
+    if is_jpeg(data):
+        try:
+            return np.asarray(simplejpeg.decode_jpeg(data, "BGR", strict=True), np.uint8)
+        except ValueError as error:
+            raise RecordingError(f"a JPEG picture of {len(data)} bytes that is damaged: {error}") from None
     picture = cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_COLOR_BGR) if data else None
     if picture is None:
         raise RecordingError(f"a picture of {len(data)} bytes that cannot be decoded")

@@ -6,12 +6,24 @@ from typing import Final
 
 from sdt_tools.clock import SECOND_NS
 from sdt_tools.config import MotionConfig, RateConfig
-from sdt_tools.frames import CameraImage, LidarScan, Message, MotionClass, MotionCommand, Twist
+from sdt_tools.frames import (
+    CameraImage,
+    LidarScan,
+    LogEntry,
+    LogLevel,
+    Message,
+    Mode,
+    MotionClass,
+    MotionCommand,
+    Twist,
+)
 from sdt_tools.protocols import Choice, Chooser, Driver, Expert, Observation
 from sdt_tools.recording.live.perturb import PERTURBATION
 
 STOP: Final = "stop"
 """The driver's name in commands that only stop the robot: nobody's idea of what is right there."""
+MODE_LOG: Final = "mode"
+"""The name of session log entries about changes of mode."""
 BLIND_S: Final = 0.2
 """A robot that has seen nothing for so long stands, or for two and a half scans where they come more slowly."""
 
@@ -49,6 +61,9 @@ class DecisionLoop:
         self._decided_on: LidarScan | None = None
         self._seen_ns = start_ns
         self._moving = False
+        self._mode: Mode | None = None
+        self._says = ""
+        self._news: list[LogEntry] = []
 
     def see(self, message: Message, now_ns: int) -> None:
         """Keep the newest scan and image, received by ``now_ns``."""
@@ -80,7 +95,13 @@ class DecisionLoop:
         if not self._moving:
             return None
         self._moving = False
-        return MotionCommand(now_ns, MotionClass.STAY, self._motions.twist(MotionClass.STAY), STOP)
+        mode = Mode.ACTIVE if self._mode is None else self._mode
+        return MotionCommand(now_ns, MotionClass.STAY, self._motions.twist(MotionClass.STAY), STOP, mode)
+
+    def news(self) -> list[LogEntry]:
+        """What the decisions since the last call have for the session log: a change of mode, what the driver says."""
+        news, self._news = self._news, []
+        return news
 
     def _command(self, scan: LidarScan, observation: Observation) -> MotionCommand:
         deciders = self._deciders
@@ -95,14 +116,23 @@ class DecisionLoop:
         forced = motion is not choice.motion
         self.decisions += 1
         self.forced += forced
+        self._note(choice, observation.now_ns)
         return MotionCommand(
             stamp_ns=scan.stamp_ns,
             motion=motion,
             twist=_at_speed(self._motions.twist(motion), choice.speed),
             driver=PERTURBATION if forced else choice.driver,
+            mode=choice.mode,
             intervention=choice.intervention,
             expert=expert,
         )
+
+    def _note(self, choice: Choice, now_ns: int) -> None:
+        if self._mode is not None and choice.mode is not self._mode:
+            self._news.append(LogEntry(now_ns, LogLevel.INFO, f"mode: {choice.mode.label}", MODE_LOG))
+        if choice.says not in ("", self._says):
+            self._news.append(LogEntry(now_ns, LogLevel.WARNING, choice.says, choice.driver))
+        self._mode, self._says = choice.mode, choice.says
 
 
 def _at_speed(twist: Twist, speed: float) -> Twist:

@@ -262,6 +262,7 @@ class LiveLoop:
             self._stands = False
             self._actuator.command(command.twist)
             self._keep(Received(now_ns, command))
+            self._log_all(self._decisions.news())
 
     def _log(self, level: LogLevel, text: str) -> None:
         self._keep(Received(self._now_ns, LogEntry(self._now_ns, level, text)))

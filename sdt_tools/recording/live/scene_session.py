@@ -86,7 +86,7 @@ def _record_scene(
         source.info,
         dump_config(config),
         recording_id=random_id() if config.realtime else None,
-        notes={"light": layout.light},
+        notes=layout.notes(),
         start_ns=start_ns,
         realtime=config.realtime,
     ) as writer:

@@ -121,7 +121,7 @@ def _play_world(
             source.info,
             dump_config(config),
             recording_id=random_id() if config.realtime else None,
-            notes={"light": layout.light, **notes},
+            notes={**layout.notes(), **notes},
             start_ns=at_ns,
             realtime=realtime,
         )

@@ -45,7 +45,7 @@ class VisionTrainingConfig(Config):
     preprocess: ImagePreprocessConfig = ImagePreprocessConfig()
     pretrained: bool = True
     weights: Path | None = None
-    last_blocks: int = Field(default=5, ge=0)
+    last_blocks: int = Field(default=8, ge=0)
     epochs: int = Field(default=7, ge=1)
     batch_size: int = Field(default=32, ge=1)
     adversarial: AdversarialConfig = AdversarialConfig()
@@ -65,11 +65,11 @@ class VisionTrainingConfig(Config):
 
 
 BACKBONES: Final = ("lite0", "resnet50")
-_ATTACKED_EPOCHS: Final = 12
+_ATTACKED_EPOCHS: Final = 9
 
 
 def vision_recipe(backbone: str, epsilon: int, epochs: int | None = None) -> VisionTrainingConfig:
-    """The settings that a training without a configuration starts from; a third of an attacked one's epochs are plain.
+    """The settings that a training without a configuration starts from; an attacked one's first half is plain.
 
     Raises UsageError for an unknown backbone.
     """
@@ -81,5 +81,5 @@ def vision_recipe(backbone: str, epsilon: int, epochs: int | None = None) -> Vis
         return plain
     planned = _ATTACKED_EPOCHS if epochs is None else epochs
     return plain.model_copy(
-        update={"epochs": planned, "adversarial": AdversarialConfig(epsilon=epsilon, plain_epochs=planned // 3)}
+        update={"epochs": planned, "adversarial": AdversarialConfig(epsilon=epsilon, plain_epochs=(planned + 1) // 2)}
     )

@@ -17,6 +17,7 @@ from sdt_tools.error_analysis.explain import explain
 from sdt_tools.error_analysis.labelled import load_labelled
 from sdt_tools.error_analysis.recorded import find_recordings, read_situations
 from sdt_tools.error_analysis.report.document import ErrorReport, summarise
+from sdt_tools.error_analysis.spaces import scan_space
 from sdt_tools.errors import ConfigError, OutputExistsError, RecordingError, SdtError, UsageError
 from sdt_tools.replay.replay import replay
 
@@ -56,7 +57,7 @@ def report_of(predictions: Path, material: Material, options: ErrorOptions = OPT
     """The analysis without its files."""
     frames = load_labelled(predictions, options)
     scans, _ = read_situations(frames, find_recordings(frames, [material.recordings]), options)
-    return summarise(frames, explain(frames, scans, options), options)
+    return summarise(frames, explain(frames, scan_space(scans), options), options)
 
 
 @pytest.fixture(scope="module")
@@ -80,7 +81,7 @@ def test_the_folder_holds_tags_report_and_figures(analysed: tuple[ErrorReport, P
     files = ["epsilon.png", "errors.json", "report.html", "tags.parquet", "tags.png"]
     assert sorted(path.name for path in out.iterdir()) == files
     document = json.loads((out / "errors.json").read_text())
-    assert document["options"] == OPTIONS.model_dump(mode="json")
+    assert document["options"] == ErrorOptions(neighbourhood="scan").model_dump(mode="json")
     assert len(document["inputs"]["recordings"]) == 10
     tags = pl.read_parquet(out / "tags.parquet")
     assert dict(tags.group_by("tag").len().rows()) == {"conditional": 70, "correct": 130}
@@ -156,7 +157,7 @@ def test_a_disk_without_room_for_scans_is_named(
         raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
 
     monkeypatch.setattr(os, "posix_fallocate", refuse)
-    with pytest.raises(SdtError, match=r"no room for .* GB of scans \(No space left on device\); free some"):
+    with pytest.raises(SdtError, match=r"no room for .* GB to compare frames \(No space left on device\); free some"):
         analyse_errors(material.predictions, [material.recordings], OPTIONS, tmp_path / "errors")
     assert list(tmp_path.iterdir()) == []
 

@@ -4,19 +4,22 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from sdt_tools.error_analysis.definitions import ErrorOptions
-from sdt_tools.error_analysis.distance import estimate_epsilon, follows_closely, pair_distances_m, rms_m, situations
+from sdt_tools.error_analysis.distance import pair_distances_m, rms_m, situations
+from sdt_tools.error_analysis.epsilon import estimate_epsilon, follows_closely
+from sdt_tools.error_analysis.spaces import VectorSpace, scan_space
 from sdt_tools.errors import UsageError
 
 SECOND_NS = 1_000_000_000
 OPTIONS = ErrorOptions()
 
 
-def straight_drives(steps_m: list[float], recordings: int = 1) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Scans that are flat at a distance growing by ``steps_m``; recordings are 1 m apart."""
+def straight_drives(steps_m: list[float], recordings: int = 1) -> tuple[VectorSpace, np.ndarray, np.ndarray]:
+    """The space of scans that are flat at a distance growing by ``steps_m``; recordings are 1 m apart."""
     at = np.concatenate([0.1 + number + np.cumsum([0.0, *steps_m]) for number in range(recordings)])
     frames = len(steps_m) + 1
     scans = np.repeat(at[:, None], 8, axis=1).astype(np.float32)
-    return scans, np.repeat(np.arange(recordings), frames), np.tile(np.arange(frames) * SECOND_NS // 10, recordings)
+    stamps_ns = np.tile(np.arange(frames) * SECOND_NS // 10, recordings)
+    return scan_space(scans), np.repeat(np.arange(recordings), frames), stamps_ns
 
 
 @given(st.floats(-1.0, 1.0), st.integers(1, 541))
@@ -45,12 +48,12 @@ def test_two_noisy_copies_with_codes_are_near_each_other() -> None:
 def test_epsilon_is_the_percentile_of_successive_distances() -> None:
     steps = [0.01 * step for step in range(1, 12)]
     epsilon = estimate_epsilon(*straight_drives(steps), OPTIONS)
-    assert epsilon.epsilon_m == pytest.approx(np.percentile(steps, 90), abs=1e-6)
+    assert epsilon.value == pytest.approx(np.percentile(steps, 90), abs=1e-6)
 
 
 def test_epsilon_is_taken_within_recordings() -> None:
     epsilon = estimate_epsilon(*straight_drives([0.01] * 5, recordings=2), OPTIONS)
-    assert epsilon.successive_m.max() == pytest.approx(0.01, abs=1e-6)
+    assert epsilon.successive.max() == pytest.approx(0.01, abs=1e-6)
 
 
 def test_a_gap_in_time_parts_frames() -> None:
@@ -60,7 +63,7 @@ def test_a_gap_in_time_parts_frames() -> None:
 
 def test_a_given_epsilon_is_taken_as_it_is() -> None:
     epsilon = estimate_epsilon(*straight_drives([0.01] * 5), ErrorOptions(epsilon_m=0.3))
-    assert (epsilon.epsilon_m, epsilon.source) == (0.3, "given")
+    assert (epsilon.value, epsilon.source) == (0.3, "given")
 
 
 def test_a_wide_epsilon_is_warned_of() -> None:
@@ -72,8 +75,8 @@ def test_a_wide_epsilon_is_warned_of() -> None:
 def test_of_one_recording_frames_far_apart_in_time_are_unrelated() -> None:
     scans, recording, stamps_ns = straight_drives([0.01] * 199)
     epsilon = estimate_epsilon(scans, recording, stamps_ns, OPTIONS)
-    assert epsilon.unrelated_m.size > 100
-    assert epsilon.unrelated_m.min() == pytest.approx(1.0, abs=1e-3)  # 10 s are 100 steps of 1 cm
+    assert epsilon.unrelated.size > 100
+    assert epsilon.unrelated.min() == pytest.approx(1.0, abs=1e-3)  # 10 s are 100 steps of 1 cm
 
 
 def test_lone_frames_cannot_give_epsilon() -> None:

@@ -4,8 +4,8 @@ import polars as pl
 from sdt_tools.error_analysis.conditions.search import find_conditions
 from sdt_tools.error_analysis.definitions import ErrorOptions, Tag
 from sdt_tools.error_analysis.explain import explain
-from sdt_tools.error_analysis.neighbours import build_index
 from sdt_tools.error_analysis.selftest.material import Material, with_errors
+from sdt_tools.error_analysis.spaces import scan_space
 from sdt_tools.error_analysis.tagging import error_neighbours, tag_errors
 
 OPTIONS = ErrorOptions()
@@ -23,12 +23,12 @@ def line(positions_m: list[float], wrong: list[int], seconds: float = 0.1, **opt
     rows = rows.with_columns(stamp_ns=(np.arange(len(positions_m)) * seconds * 1e9).astype(np.int64))
     frames = with_errors(rows, np.isin(np.arange(len(positions_m)), wrong), OPTIONS)
     scans = np.repeat(np.array(positions_m)[:, None], 4, axis=1).astype(np.float32)
-    return explain(frames, scans, ErrorOptions(epsilon_m=0.1, **options)).tagged
+    return explain(frames, scan_space(scans), ErrorOptions(epsilon_m=0.1, **options)).tagged
 
 
 def test_a_model_that_is_always_wrong_is_systematically_wrong() -> None:
     rows, scans = drives(11, recordings=8, frames=40)
-    tagged = explain(with_errors(rows, np.ones(len(rows), bool), OPTIONS), scans, OPTIONS).tagged
+    tagged = explain(with_errors(rows, np.ones(len(rows), bool), OPTIONS), scan_space(scans), OPTIONS).tagged
     assert tagged.count(Tag.SYSTEMATIC) == len(rows)
     assert set(tagged.selection) == {"all"}
 
@@ -36,7 +36,7 @@ def test_a_model_that_is_always_wrong_is_systematically_wrong() -> None:
 def test_a_scenario_that_is_always_wrong_is_named() -> None:
     rows, scans = drives(12, recordings=9, frames=40)
     wrong = (rows["scenario"] == "through_gate").to_numpy()
-    tagged = explain(with_errors(rows, wrong, OPTIONS), scans, OPTIONS).tagged
+    tagged = explain(with_errors(rows, wrong, OPTIONS), scan_space(scans), OPTIONS).tagged
     assert np.array_equal(np.array(tagged.tag) == Tag.SYSTEMATIC, wrong)
     assert set(tagged.selection) == {"", "scenario = through_gate"}
 
@@ -45,7 +45,7 @@ def test_right_frames_in_a_systematic_selection_stay_correct() -> None:
     rows, scans = drives(13, recordings=4, frames=40)
     wrong = (rows["recording"] == "drive_001").to_numpy()
     wrong[np.flatnonzero(wrong)[7]] = False
-    tagged = explain(with_errors(rows, wrong, OPTIONS), scans, ErrorOptions(tau=0.05)).tagged
+    tagged = explain(with_errors(rows, wrong, OPTIONS), scan_space(scans), ErrorOptions(tau=0.05)).tagged
     assert np.array_equal(np.array(tagged.tag) == Tag.SYSTEMATIC, wrong)
 
 
@@ -93,7 +93,7 @@ def test_inside_a_condition_only_an_implausible_lone_error_is_transient() -> Non
     at[89], at[91] = at[90] - 0.05, at[90] + 0.05
     scans = np.repeat(at[:, None], 4, axis=1).astype(np.float32)
     inside = np.ones((1, 120), bool)
-    neighbours = error_neighbours(build_index(scans), frames, inside, 0.1)
+    neighbours = error_neighbours(scan_space(scans), frames, inside, 0.1)
     tagged = tag_errors(frames, neighbours, inside, OPTIONS)
     assert tagged.transient_by_definition[[5, 90]].all()
     assert tagged.tag[5] is Tag.TRANSIENT  # 59 right neighbours, although one in six fails under the condition
@@ -127,7 +127,7 @@ def test_an_epsilon_that_leaves_no_neighbours_leaves_lone_errors_isolated_and_bu
     rows, scans = drives(13, recordings=4, frames=70)
     lone, burst = [20, 70, 120], [160, 161, 162]
     frames = with_errors(rows, np.isin(np.arange(len(rows)), lone + burst), OPTIONS)
-    tagged = explain(frames, scans, ErrorOptions(epsilon_m=1e-5)).tagged
+    tagged = explain(frames, scan_space(scans), ErrorOptions(epsilon_m=1e-5)).tagged
     assert [tagged.tag[frame] for frame in lone] == [Tag.ISOLATED] * 3
     assert [tagged.tag[frame] for frame in burst] == [Tag.UNEXPLAINED] * 3
     assert not tagged.transient_by_definition.any()
@@ -137,6 +137,6 @@ def test_under_an_epsilon_larger_than_everything_only_a_single_error_is_transien
     rows, scans = drives(14, recordings=4, frames=50)
     for wrong, tag in (([20], Tag.TRANSIENT), ([20, 120], Tag.UNEXPLAINED)):
         frames = with_errors(rows, np.isin(np.arange(len(rows)), wrong), OPTIONS)
-        tagged = explain(frames, scans, ErrorOptions(epsilon_m=100.0)).tagged
+        tagged = explain(frames, scan_space(scans), ErrorOptions(epsilon_m=100.0)).tagged
         assert [tagged.tag[frame] for frame in wrong] == [tag] * len(wrong)
         assert tagged.neighbours[20] == len(rows) - 1

@@ -7,7 +7,8 @@ import pytest
 from sdt_tools.config import dump_config
 from sdt_tools.errors import ConfigError, UsageError
 from sdt_tools.evaluation.closed_loop import ClosedLoopConfig, drive_closed_loop
-from sdt_tools.evaluation.evaluate import evaluate_follow, parse_seeds
+from sdt_tools.evaluation.evaluate import evaluate_follow
+from sdt_tools.evaluation.grid import parse_seeds
 from sdt_tools.evaluation.outcome import Outcome
 from sdt_tools.evaluation.policies import ConstantPolicy, ExpertPolicy, policy_for
 from sdt_tools.evaluation.saving import SaveRuns, recorder_factory

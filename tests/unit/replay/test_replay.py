@@ -157,7 +157,7 @@ def test_labels_without_a_scan_and_recordings_without_a_journal_are_counted(tmp_
     shorter = write_drive(tmp_path, "drive", scans=50)
     other = write_drive(tmp_path, "other", scans=10, seed=5)
     summary = replay(NearestAhead(), [shorter, other], tmp_path / "labels", tmp_path / "p.parquet")
-    assert summary.labels_without_scan == 10
+    assert summary.labels_without_frame == 10
     assert summary.without_journal == ("other",)
 
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from sdt_tools.frames import Gesture, Mode
-from sdt_tools.scene.gestures import Arms, arms_at, behaviour_at, commanded_mode_at, gesture_at
+from sdt_tools.scene.gestures import Arms, arms_at, behaviour_at, commanded_mode_at, gesture_at, signals_at
 from sdt_tools.scene.layout import Behaviour, BehaviourEvent, GestureEvent
 from sdt_tools.scene.manners import with_manners
 
@@ -61,3 +61,16 @@ def test_varied_gestures_are_half_made_when_they_begin_and_end() -> None:
     assert len({event.moves_s for event in events}) == len(events)
     assert len({event.manner for event in events}) == len(events)
     assert 2 < sum(event.manner.other_hand for event in events) < 30
+
+
+def test_he_signals_from_turning_round_until_his_arms_are_down() -> None:
+    slow = (GestureEvent(5.0, Gesture.ENABLE, 2.0, moves_s=0.6, lead_s=0.3), GestureEvent(9.0, Gesture.IDLE, 2.0))
+
+    assert [signals_at(slow, time_s) for time_s in (3.7, 3.9, 5.0, 7.2, 7.4, 9.5)] == [
+        False,
+        True,
+        True,
+        True,
+        False,
+        False,
+    ]

@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass, field
 
-from sdt_tools.frames import MotionClass
+from sdt_tools.frames import Mode, MotionClass
 from sdt_tools.protocols import Choice, Chooser, Observation
 from sdt_tools.recording.live.decide import STOP
 from sdt_tools.teleop.hand import Hand
@@ -90,3 +90,27 @@ def test_after_an_emergency_stop_the_policy_waits_to_be_given_the_robot() -> Non
     assert driver.choose(NOTHING) == Choice(STAY, STOP, intervention=True)
     clock.hand.give_back()
     assert driver.choose(NOTHING).motion is FORWARD
+
+
+@dataclass
+class Resting:
+    """A controller that is idle."""
+
+    name: str = "controller"
+    asked: int = 0
+
+    def choose(self, observation: Observation) -> Choice:
+        self.asked += 1
+        return Choice(STAY, "idle", mode=Mode.IDLE)
+
+
+def test_a_controller_is_asked_all_the_time_and_its_mode_stands_whoever_drives() -> None:
+    clock, controller = Clock(), Resting()
+    takeover = Takeover(controller, clock.hand)
+
+    assert takeover.choose(NOTHING) == Choice(STAY, "idle", mode=Mode.IDLE)
+    clock.hand.press(LEFT)
+    assert takeover.choose(NOTHING) == Choice(LEFT, "keyboard", intervention=True, mode=Mode.IDLE)
+    clock.hand.stop()
+    assert takeover.choose(NOTHING) == Choice(STAY, STOP, intervention=True, mode=Mode.IDLE)
+    assert controller.asked == 3

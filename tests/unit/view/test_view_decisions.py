@@ -3,6 +3,7 @@ import polars as pl
 import pytest
 from view_samples import SCAN_NS, predictions, scan_ns, tags
 
+from sdt_tools.class_colors import MOTIONS
 from sdt_tools.errors import UsageError
 from sdt_tools.view.decisions import ErrorRun, Labels, error_runs, judge, labels_of, models_of
 
@@ -62,7 +63,7 @@ def test_an_unknown_tag_is_named() -> None:
 
 def test_unresolved_labels_are_left_out_and_the_rest_is_in_order() -> None:
     frame = pl.DataFrame({"stamp_ns": [30, 10, 20], "label": ["stay", "forward", None]})
-    labels = labels_of(frame)
+    labels = labels_of(frame, MOTIONS)
     assert (labels.stamps_ns.tolist(), labels.names) == ([10, 30], ("forward", "stay"))
 
 

@@ -100,7 +100,7 @@ def test_an_example_leads_to_its_stamp(analysed: Path) -> None:
 def test_the_tags_say_what_they_were_made_from(analysed: Path) -> None:
     made_from = read_made_from(analysed / "errors" / "tags.parquet")
     assert made_from == json.loads((analysed / "errors" / "errors.json").read_text())
-    assert made_from["options"] == ErrorOptions().model_dump(mode="json")
+    assert made_from["options"] == ErrorOptions(neighbourhood="scan").model_dump(mode="json")
 
 
 def test_the_commands_name_the_place_where_the_folder_will_lie(analysed: Path, tmp_path: Path) -> None:

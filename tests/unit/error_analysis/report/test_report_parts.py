@@ -8,13 +8,14 @@ import polars as pl
 import pytest
 
 from sdt_tools.error_analysis.conditions.predicates import Condition, Predicate
-from sdt_tools.error_analysis.distance import Epsilon
+from sdt_tools.error_analysis.epsilon import Epsilon
+from sdt_tools.error_analysis.nearest import nearest_frames
 from sdt_tools.error_analysis.report.breakdown import parts_by
 from sdt_tools.error_analysis.report.figures import as_svg, bound_figure, epsilon_figure
-from sdt_tools.error_analysis.report.nearest import nearest_frames
 from sdt_tools.error_analysis.report.scan_drawing import hits_path, motion_path, operator_place
 from sdt_tools.error_analysis.report.strips import HEIGHT, SMALLEST, WIDTH, strip_of
 from sdt_tools.error_analysis.report.words import condition_in_words
+from sdt_tools.error_analysis.spaces import MEASURES
 from sdt_tools.frames import RAYS
 from sdt_tools.statistics import wilson
 
@@ -29,7 +30,7 @@ def test_the_nearest_frames_are_those_of_brute_force() -> None:
     for row, distances, near in zip(rows, exact, nearest_frames(scans, rows, epsilon_m, 4), strict=True):
         order = [other for other in np.argsort(distances) if 0 < distances[other] <= epsilon_m][:4]
         assert [one.row for one in near] == order
-        assert [one.distance_m for one in near] == pytest.approx(distances[order].tolist(), abs=1e-6)
+        assert [one.distance for one in near] == pytest.approx(distances[order].tolist(), abs=1e-6)
         assert row not in order
 
 
@@ -102,7 +103,7 @@ def test_the_operator_is_drawn_where_he_is_known_and_near() -> None:
 
 
 def test_pictures_in_the_page_take_its_colours() -> None:
-    epsilon = Epsilon(0.2, "given", np.array([0.1, 0.15]), np.array([0.9]), "")
+    epsilon = Epsilon(0.2, MEASURES["scan"], "given", np.array([0.1, 0.15]), np.array([0.9]), "")
     values, wrong = np.linspace(0.0, 2.0, 100), np.linspace(0.0, 2.0, 100) < 0.5
     for figure in (epsilon_figure(epsilon), bound_figure(Predicate("front_range_m", "<", 0.5), values, wrong)):
         text = as_svg(figure, "here")
@@ -113,5 +114,5 @@ def test_pictures_in_the_page_take_its_colours() -> None:
 
 
 def test_epsilon_is_drawn_without_any_pair() -> None:
-    epsilon = Epsilon(0.2, "given", np.empty(0), np.empty(0), "")
+    epsilon = Epsilon(0.2, MEASURES["scan"], "given", np.empty(0), np.empty(0), "")
     assert "ε = 0.2 m" in as_svg(epsilon_figure(epsilon), "here")

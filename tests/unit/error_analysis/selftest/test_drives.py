@@ -2,7 +2,8 @@ import numpy as np
 import pytest
 
 from sdt_tools.error_analysis.definitions import ErrorOptions
-from sdt_tools.error_analysis.distance import estimate_epsilon, situations
+from sdt_tools.error_analysis.distance import situations
+from sdt_tools.error_analysis.epsilon import estimate_epsilon
 from sdt_tools.error_analysis.selftest.drives import (
     FRONT_RAD,
     NOISE_M,
@@ -11,6 +12,7 @@ from sdt_tools.error_analysis.selftest.drives import (
     smooth_series,
     wander,
 )
+from sdt_tools.error_analysis.spaces import scan_space
 from sdt_tools.frames import RAYS, ray_angles_rad
 from sdt_tools.replay.predictions import SCHEMA
 
@@ -58,6 +60,6 @@ def test_successive_scans_are_closer_than_others() -> None:
     wandered = wander(np.random.default_rng(0), 12, 100)
     scans = situations(scans_of(wandered, np.random.default_rng(1)), ErrorOptions())
     stamps_ns = np.arange(len(scans)) * 100_000_000
-    epsilon = estimate_epsilon(scans, wandered.recording, stamps_ns, ErrorOptions())
-    assert 0.05 < epsilon.epsilon_m < 0.4
-    assert np.mean(epsilon.unrelated_m <= epsilon.epsilon_m) < 0.05
+    epsilon = estimate_epsilon(scan_space(scans), wandered.recording, stamps_ns, ErrorOptions())
+    assert 0.05 < epsilon.value < 0.4
+    assert np.mean(epsilon.unrelated <= epsilon.value) < 0.05

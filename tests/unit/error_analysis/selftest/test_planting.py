@@ -27,7 +27,7 @@ def ground() -> Ground:
 @pytest.fixture(scope="module")
 def near(ground: Ground) -> np.ndarray:
     """Which frames lie within ε of each other, by brute force over the whole matrix."""
-    exact = ground.scans.astype(np.float64)
+    exact = ground.space.vectors.astype(np.float64)
     lengths = (exact * exact).sum(axis=1)
     squares = (lengths[:, None] + lengths[None] - 2.0 * exact @ exact.T) / exact.shape[1]
     return (squares > 1e-9) & (squares <= ground.epsilon_m**2)

@@ -75,7 +75,8 @@ def test_grey_has_three_equal_colours(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("spoil", "said"),
     [
-        (lambda data: data[: len(data) // 2], "breaks off"),
+        (lambda data: data[: len(data) // 2], "damaged: Premature end"),
+        (lambda data: data[:700] + bytes(range(1, 61)) + data[760:], "damaged: Corrupt JPEG data"),
         (lambda _: b"", "of 0 bytes"),
         (lambda _: b"no picture", "cannot be decoded"),
     ],

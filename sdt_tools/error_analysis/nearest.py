@@ -18,13 +18,13 @@ class Near:
     """A frame by its row, and how far it is from another."""
 
     row: int
-    distance_m: float
+    distance: float
 
 
 def nearest_frames(
-    scans: Float32[np.ndarray, "frames rays"], rows: Int64[np.ndarray, "wanted"], epsilon_m: float, count: int
+    scans: Float32[np.ndarray, "frames rays"], rows: Int64[np.ndarray, "wanted"], epsilon: float, count: int
 ) -> list[list[Near]]:
-    """For each of ``rows`` the ``count`` nearest other frames within ``epsilon_m``, nearest first; copies left out.
+    """For each of ``rows`` the ``count`` nearest other frames within ``epsilon``, nearest first; copies left out.
 
     One pass over ``scans``, a block at a time.
     """
@@ -48,6 +48,6 @@ def nearest_frames(
     for row, candidates, quick in zip(rows, at, best, strict=True):
         others = np.unique(candidates[np.isfinite(quick)])
         exact = rms_m(np.repeat(scans[row][None], len(others), axis=0), np.asarray(scans[others]))
-        near = [Near(int(o), float(d)) for d, o in sorted(zip(exact, others, strict=True)) if 0.0 < d <= epsilon_m]
+        near = [Near(int(o), float(d)) for d, o in sorted(zip(exact, others, strict=True)) if 0.0 < d <= epsilon]
         found.append(near[:count])
     return found

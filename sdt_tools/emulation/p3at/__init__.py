@@ -1,0 +1,1 @@
+"""An emulated Pioneer P3-AT."""

@@ -1,0 +1,1 @@
+"""The real robot: what its devices say, and what they are told."""

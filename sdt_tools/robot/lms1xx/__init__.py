@@ -1,0 +1,1 @@
+"""SICK LMS1xx laser scanners over TCP: telegrams, settings, clock and driver."""

@@ -1,0 +1,1 @@
+"""The Pioneer P3-AT base, over ARCOS."""
