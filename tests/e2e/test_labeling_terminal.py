@@ -38,7 +38,7 @@ def type_at(terminal: Terminal, keys: list[str], acts_a_second: float) -> None:
         terminal.look()
 
 
-@pytest.mark.parametrize("frames", [80, pytest.param(1000, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("frames", [40, pytest.param(1000, marks=pytest.mark.slow)])
 def test_twenty_acts_a_second_are_all_taken(tmp_path: Path, labeling: Start, frames: int) -> None:
     drive = record(tmp_path / "drive.mcap", frames)
     terminal = labeling(*label(tmp_path, drive, "anna"), columns=120, lines=40)
