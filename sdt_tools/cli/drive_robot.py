@@ -96,14 +96,17 @@ def _drive(
     from sdt_tools.cli.seat import viewer_observers
     from sdt_tools.control.robot.drive import control_robot, warm_up
     from sdt_tools.control.robot.opened import open_robot
-    from sdt_tools.models.vision.checkpoint import load_vision_checkpoint
 
     name = f"policy:{config.driver}" if Path(config.driver).is_dir() else config.driver
     follow = make_robot_driver(name, "--follow", _FORMS)
-    network = None if config.vision is None else load_vision_checkpoint(Path(config.vision))
+    network = None
+    if config.vision is not None:
+        from sdt_tools.models.vision.checkpoint import load_vision_checkpoint  # takes a second to import
+
+        network = load_vision_checkpoint(Path(config.vision))
     warm_up(follow, network)
     with open_robot(config.robot, config.guarded) as opened:
-        streams = viewer_observers(how.viewer, config.robot.motions)()
+        streams = viewer_observers(how.viewer, config.robot.motions, realtime=True)()
         if how.seated:
             from sdt_tools.teleop.app.app import drive as drive_in_cockpit
 

@@ -185,4 +185,4 @@ def _record_takes(config: "RobotTakesConfig", folder: Path, resume: bool, how: L
 def _streams(opened: "OpenRobot", how: Live) -> "Sequence[Observer]":
     from sdt_tools.cli.seat import viewer_observers
 
-    return viewer_observers(how.viewer, opened.config.motions)()
+    return viewer_observers(how.viewer, opened.config.motions, realtime=True)()

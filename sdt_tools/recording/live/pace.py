@@ -11,6 +11,7 @@ PATIENCE_S: Final = 0.05
 
 _LOOKS_UP_S: Final = 0.05
 """Signals and keys are heard so often where nothing arrives."""
+_SHORTEST_S: Final = 0.002
 
 Arrival = Callable[[float], bool]
 """Waits for something to have arrived, at most so many seconds; whether it has."""
@@ -93,6 +94,8 @@ class ArrivalPace:
         if self._released_ns is not None:
             self.missed += (self._clock.now_ns() - self._released_ns) // self._period_ns
         self._arrival(max(2.5 * self._period_ns / SECOND_NS, _LOOKS_UP_S))
+        if self._released_ns is not None and self._clock.now_ns() - self._released_ns < _SHORTEST_S * SECOND_NS:
+            sleep(_SHORTEST_S)  # what has arrived is not taken: a source that hangs is no reason to spin
         self._released_ns = self._clock.now_ns()
         return self._released_ns
 
