@@ -26,8 +26,8 @@ from sdt_tools.recording.writer import RecordingWriter
 class Wheel:
     """Who drives what, how often, and how fast each motion is. ``expert`` is asked beside, where there is one.
 
-    Without a ``chooser`` nobody moves the robot. ``arrival`` waits for the source's next scan; without it the source is
-    read once a scan period. ``wire`` knows when commands were sent. Of a ``simulated`` source the stamps are no times
+    Without a ``chooser`` nobody moves the robot. ``arrival`` waits for the next scan of a source that never keeps
+    its reader waiting; without it the source is read once a scan period. ``wire`` knows when commands were sent. Of a ``simulated`` source the stamps are no times
     of arrival: a scan arrives when the loop is given it.
     """
 
@@ -122,7 +122,7 @@ def _drive_unrecorded(
     pace = paced(source.start_ns, rates.scan_hz, clock, arrival=wheel.arrival)
     recorder = _Unrecorded(source.start_ns, seconds, control, lambda: pace.missed + decisions.missed)
     encoder = PictureEncoder(behind=clock is not None)
-    reading = reading_of(source, pace.takes_long, clock is not None)
+    reading = reading_of(source, pace.takes_long, clock is not None and wheel.arrival is None)
     loop = LiveLoop(source, stopwatch, decisions, pace, observers, recorder, progress, encoder, reading)
     started_s = perf_counter()
     try:

@@ -70,6 +70,8 @@ class RobotSource:
     def begin(self) -> None:
         """Start now: what devices have said before is said now, and what they have sensed before is forgotten."""
         self._start_ns = self._clock.now_ns()
+        if self._camera is not None:
+            self._camera.forget()
         self._early = self._introduction()
 
     def hear(self, voice: Voice) -> None:

@@ -13,6 +13,8 @@ import pytest
 from typer.main import get_command
 
 from sdt_tools.cli.app import app
+from sdt_tools.config import load_config
+from sdt_tools.control.robot.config import RobotFile
 from sdt_tools.frames import RAYS
 from sdt_tools.models.card import ModelCard
 from sdt_tools.models.checkpoint import save_checkpoint
@@ -40,6 +42,8 @@ SMALLER = {
     "my_careful_vision --follow": "my_careful_vision --scenario summoned_plain --seeds 1000 --follow",
     "--seeds 1000-1019": "--seeds 1000-1001",
     "--out analysis/my_certified\n": "--out analysis/my_certified --epochs 2 --delta 1000\n",
+    "--write-config emulated_robot.toml": "--no-camera --lidar-port 0 --base-port 0 --write-config emulated_robot.toml",
+    "--seconds 10 --out recordings/robot.mcap": "--seconds 1 --out recordings/robot.mcap",
     "--export analysis/my_certified_onnx": "--export analysis/my_certified_onnx --restarts 1 --steps 1",
     "analysis/practice --level 3": "analysis/practice --level 3 --restarts 1 --steps 1 --near-scans 4",
     "--out analysis/suspects.csv": "--out analysis/suspects.csv --folds 2 --epochs 1",
@@ -67,7 +71,7 @@ def workplace(tmp_path: Path) -> Path:
 
 
 def test_the_commands_run_in_the_order_they_are_given(workplace: Path) -> None:
-    assert len(blocks()) == 13
+    assert len(blocks()) == 14
     script = "".join(blocks())
     for said, small in SMALLER.items():
         script = script.replace(said, small)
@@ -85,6 +89,13 @@ def test_the_scenario_can_be_played(tmp_path: Path) -> None:
 def test_the_yard_can_be_played(tmp_path: Path) -> None:
     (tmp_path / "my_yard.toml").write_text(toml_with("camera ="))
     assert layout_for(str(tmp_path / "my_yard.toml"), 3).camera == "video"
+
+
+def test_the_robot_can_be_loaded(tmp_path: Path) -> None:
+    (tmp_path / "robot.toml").write_text(toml_with("[base]"))
+    robot = load_config(RobotFile, tmp_path / "robot.toml")
+    assert robot.base is not None
+    assert (robot.base.address, robot.base.limits.forward_mps) == ("/dev/ttyUSB0", 0.5)
 
 
 def test_the_domains_can_be_loaded(tmp_path: Path) -> None:

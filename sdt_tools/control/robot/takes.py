@@ -19,7 +19,6 @@ from sdt_tools.recording.live.keep_last import KeepLast
 from sdt_tools.recording.live.loop import LiveLoop
 from sdt_tools.recording.live.outcome import RecordingProgress
 from sdt_tools.recording.live.pace import paced
-from sdt_tools.recording.live.reading import reading_of
 from sdt_tools.recording.live.session_folder import SessionFolder
 from sdt_tools.recording.live.take import Tally
 from sdt_tools.recording.live.takes import SessionSummary, TakeRecorder
@@ -76,9 +75,7 @@ def record_robot_takes(
         return Tally(decisions.decisions, decisions.forced, pace.missed + decisions.missed)
 
     watching = (*robot.observers, *observers)
-    reading = reading_of(source, pace.takes_long, realtime=True)
-    encoder = PictureEncoder(behind=True)
-    loop = LiveLoop(source, robot.actuator, decisions, pace, watching, recorder, progress, encoder, reading)
+    loop = LiveLoop(source, robot.actuator, decisions, pace, watching, recorder, progress, PictureEncoder(behind=True))
     try:
         with nullcontext(interrupt) if interrupt is not None else deferred_interrupt() as heard:
             recorder.begin(source.start_ns, open_writer, tally, loop.settle)

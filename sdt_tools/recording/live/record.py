@@ -48,13 +48,13 @@ def record(
 ) -> RecordingSummary:
     """Record ``source`` for ``seconds`` (without, until it ends) while ``driver``, if any, moves ``actuator``.
 
-    The source is read in ticks of one scan period, or at each ``arrival`` where it tells of those; with ``realtime``
-    ticks keep the pace of ``clock``, the host's unless another is given, a thread of its own writes and another one
-    encodes raw pictures by ``encode``: what they cannot keep up with is dropped as ``pressure`` says, and the recording
-    ends before the ``disk`` is full. Ctrl-C, SIGTERM and SIGHUP end the recording as if its time were up, and the
-    summary says so; ``interrupt`` is what hears them, where the caller listens already. Whoever holds ``control`` may
-    pause, mark and end it. On every way out the robot is told to stand still, and source and observers are closed; the
-    writer is the caller's to close.
+    The source is read in ticks of one scan period, or at each ``arrival`` where it tells of those: such a source is
+    read by threads of its own, and keeps nobody waiting. With ``realtime`` ticks keep the pace of ``clock``, the host's
+    unless another is given, a thread of its own writes and another one encodes raw pictures by ``encode``: what they
+    cannot keep up with is dropped as ``pressure`` says, and the recording ends before the ``disk`` is full. Ctrl-C,
+    SIGTERM and SIGHUP end the recording as if its time were up, and the summary says so; ``interrupt`` is what hears
+    them, where the caller listens already. Whoever holds ``control`` may pause, mark and end it. On every way out the
+    robot is told to stand still, and source and observers are closed; the writer is the caller's to close.
 
     Raises RunError where the source fails, after a word in ``/session/log``; RecordingError where the disk refuses.
     """
@@ -67,7 +67,7 @@ def record(
 
     encoder = PictureEncoder(realtime, limits, encode)
     recorder = _OneTake(Take(sink, source.start_ns, seconds, rates, tally), writer, control)
-    reading = reading_of(source, pace.takes_long, realtime)
+    reading = reading_of(source, pace.takes_long, realtime and arrival is None)
     loop = LiveLoop(source, actuator, decisions, pace, observers, recorder, progress, encoder, reading)
     recorder.settle = loop.settle
     try:

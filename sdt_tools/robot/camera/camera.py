@@ -64,6 +64,11 @@ class Camera:
             received.append(self._entry(now_ns, LogLevel.WARNING, f"no picture for {silent_s:.2f} s"))
         return sorted(received, key=lambda one: one.received_ns)
 
+    def forget(self) -> None:
+        """Begin anew: the pictures that have come so far were for nobody."""
+        self._pictures.take(self._clock.now_ns())
+        self._dropped_told = self._pictures.dropped
+
     def close(self) -> None:
         """Let the camera go. May be called twice."""
         self._closing.set()
