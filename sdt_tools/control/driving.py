@@ -26,9 +26,9 @@ from sdt_tools.recording.writer import RecordingWriter
 class Wheel:
     """Who drives what, how often, and how fast each motion is. ``expert`` is asked beside, where there is one.
 
-    Without a ``chooser`` nobody moves the robot. ``arrival`` waits for the next scan of a source that never keeps
-    its reader waiting; without it the source is read once a scan period. ``wire`` knows when commands were sent. Of a ``simulated`` source the stamps are no times
-    of arrival: a scan arrives when the loop is given it.
+    Without a ``chooser`` nobody moves the robot. ``arrival`` waits for the next scan of a source that never keeps its
+    reader waiting; without it the source is read once a scan period. ``wire`` knows when commands were sent. Of a
+    ``simulated`` source the stamps are no times of arrival: a scan arrives when the loop is given it.
     """
 
     source: Source
