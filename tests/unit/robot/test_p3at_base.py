@@ -13,7 +13,8 @@ import serial
 from base_rig import AHEAD, PORTS, QUICK, REST, driven, wait_for
 
 from sdt_tools.emergency import EmergencyStop
-from sdt_tools.emulation.p3at.faults import Fault, FaultKind
+from sdt_tools.emulation.faults import Fault
+from sdt_tools.emulation.p3at.faults import FaultKind
 from sdt_tools.emulation.p3at.server import EmulatedP3at
 from sdt_tools.errors import DeviceError, UsageError
 from sdt_tools.frames import Twist
