@@ -69,7 +69,9 @@ def _print(verdict: "Verdict") -> None:
     from rich.text import Text
 
     outcome = verdict.outcome.value
-    console.print(Text.assemble((f"{outcome:<10}", _STYLES[outcome]), f"  {verdict.rule}: {verdict.seen}"), soft_wrap=True)
+    console.print(
+        Text.assemble((f"{outcome:<10}", _STYLES[outcome]), f"  {verdict.rule}: {verdict.seen}"), soft_wrap=True
+    )
 
 
 def _settings(texts: list[str], model: Any) -> dict[str, Any]:
