@@ -17,7 +17,7 @@ _CORES: Final = 2
 _MEMORY_GB: Final = 3.0
 _STA_UNSYNC: Final = 0x40
 _TIMEX_BYTES: Final = 256
-"""struct timex is 208 bytes long."""
+"""struct timex is 208 bytes long; after ``modes`` come offset, freq, maxerror, esterror and status (adjtimex(2))."""
 _BLOCK: Final = 1 << 20
 _BLOCKS: Final = 8
 _SESSION_MB_S: Final = 3.0
@@ -61,11 +61,8 @@ def clock() -> Iterator[Finding]:
     try:
         buffer = ctypes.create_string_buffer(_TIMEX_BYTES)  # all zero: modes 0 asks, and sets nothing
         ctypes.CDLL(None, use_errno=True).adjtimex(buffer)
-        longs = ctypes.cast(buffer, ctypes.POINTER(ctypes.c_long))
-        max_error_us = longs[3]
-        status = ctypes.cast(ctypes.addressof(buffer) + 5 * ctypes.sizeof(ctypes.c_long), ctypes.POINTER(ctypes.c_int))[
-            0
-        ]
+        max_error_us = ctypes.c_long.from_buffer(buffer, 3 * ctypes.sizeof(ctypes.c_long)).value
+        status = ctypes.c_int.from_buffer(buffer, 5 * ctypes.sizeof(ctypes.c_long)).value
     except (OSError, AttributeError):
         yield warn("clock", "host", "this system does not tell whether it is synchronised", "look at its time settings")
         return

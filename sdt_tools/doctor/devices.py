@@ -11,7 +11,7 @@ from sdt_tools.errors import SdtError
 
 _CLOCK_OFF: Final = 0.01
 """In the second that is listened to, a telegram that is late by 10 ms looks like a clock that is off by so much."""
-_FULL_V: Final = 11.5
+_LOW_V: Final = 11.5
 
 
 def lidar(address: str, asked: bool) -> Iterator[Finding]:
@@ -81,9 +81,7 @@ def base(address: str, baud: int, asked: bool) -> Iterator[Finding]:
         return
     volts = f"{found.status.battery_v:.1f} V"
     yield (
-        ok("base", "battery", volts)
-        if found.status.battery_v > _FULL_V
-        else warn("base", "battery", volts, "charge it")
+        ok("base", "battery", volts) if found.status.battery_v > _LOW_V else warn("base", "battery", volts, "charge it")
     )
     if found.status.button_pressed:
         yield warn("base", "emergency button", "pressed", "release it before you drive")

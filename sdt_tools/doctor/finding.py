@@ -39,7 +39,7 @@ class Finding:
 
 def finding_of(document: Mapping[str, str]) -> Finding:
     """The finding that ``document`` writes."""
-    return Finding(**{**document, "level": Level(document["level"])})
+    return Finding(document["section"], document["what"], Level(document["level"]), document["seen"], document["do"])
 
 
 def ok(section: str, what: str, seen: str) -> Finding:

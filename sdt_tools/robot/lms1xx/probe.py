@@ -67,9 +67,8 @@ def _listened(link: Link) -> list[tuple[int, int]]:
             return times
         until_s = monotonic() + _LISTEN_S * wanted
         while monotonic() < until_s:
-            for telegram in link.receive(until_s):
-                if telegram.name == SCAN_DATA and telegram.is_scan:
-                    times.append((read_scan(telegram.fields).transmission_us, time_ns()))
+            scans = [one for one in link.receive(until_s) if one.name == SCAN_DATA and one.is_scan]
+            times.extend((read_scan(one.fields).transmission_us, time_ns()) for one in scans)
     return times
 
 
