@@ -6,7 +6,7 @@ import numpy as np
 
 from sdt_tools.frames import FRAME_CAMERA, RawPicture
 from sdt_tools.robot.contract.trial import Trial
-from sdt_tools.robot.contract.verdict import Verdict, judged
+from sdt_tools.robot.contract.verdict import Verdict, broken, judged
 
 
 def camera_rules(trial: Trial) -> list[Verdict]:
@@ -14,6 +14,9 @@ def camera_rules(trial: Trial) -> list[Verdict]:
     pictures = [one for one in trial.given if isinstance(one, RawPicture)]
     if not pictures:
         return []
+    strange = {type(one.image_bgr_u8).__name__ for one in pictures if not isinstance(one.image_bgr_u8, np.ndarray)}
+    if strange:
+        return [broken("pictures are numpy arrays", f"they are {', '.join(sorted(strange))}")]
     return [_pixels(pictures), _own(pictures)]
 
 

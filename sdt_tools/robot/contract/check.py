@@ -65,7 +65,7 @@ def check(plugin: Plugin[Any], config: Config, plan: Plan) -> Iterator[Verdict]:
     trial = Trial(clock)
     try:
         watch(device, trial, plan.seconds, lambda: not getattr(device, "finished", False))
-        wanted_hz = plan.wanted_hz or getattr(config, _RATES[plugin.kind], None)
+        wanted_hz = plan.wanted_hz or _set_hz(config, plugin.kind)
         yield from arrival_rules(trial, kind, what, wanted_hz, _LONGEST_GAP_S[plugin.kind])
         yield from {Kind.LIDAR: lidar_rules, Kind.BASE: pose_rules, Kind.CAMERA: camera_rules}[plugin.kind](trial)
         if plan.unplug is not None:
@@ -91,6 +91,11 @@ def _opened(plugin: Plugin[Any], config: Config, emergency: EmergencyStop, clock
     except Exception as error:  # whatever a driver raises is what is to be told
         return broken(rule, f"it raised {type(error).__name__}: {error}; raise DeviceError, and say what to try"), None
     return kept(rule, f"in {monotonic() - began_s:.1f} s"), device
+
+
+def _set_hz(config: Config, kind: Kind) -> float | None:
+    found = getattr(config, _RATES[kind], None)
+    return float(found) if isinstance(found, int | float) else None
 
 
 def _unplugged(device: Device, trial: Trial, kind: type, within_s: float, ask: Ask) -> Verdict:

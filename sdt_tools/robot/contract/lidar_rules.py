@@ -8,7 +8,7 @@ import numpy as np
 
 from sdt_tools.frames import FIRST_RAY_RAD, FRAME_LIDAR, RAYS, LidarScan
 from sdt_tools.robot.contract.trial import Trial
-from sdt_tools.robot.contract.verdict import Verdict, judged, not_judged
+from sdt_tools.robot.contract.verdict import Verdict, broken, judged, not_judged
 
 _CODES_BELOW_M: Final = 0.016
 """Below this a range is a code of the sensor, in thousandths."""
@@ -22,7 +22,14 @@ def lidar_rules(trial: Trial) -> list[Verdict]:
     scans = trial.scans
     if not scans:
         return []
+    strange = {type(scan.ranges_m).__name__ for scan in scans if not _is_row(scan.ranges_m)}
+    if strange:
+        return [broken("ranges are a row of numbers", f"they are {', '.join(sorted(strange))}; give a numpy array")]
     return [_rays(scans), _angles(scans), _numbers(scans), _codes(scans), _own(trial), _nearest(scans[-1])]
+
+
+def _is_row(ranges: object) -> bool:
+    return isinstance(ranges, np.ndarray) and ranges.ndim == 1 and ranges.dtype.kind in "fiu"
 
 
 def _rays(scans: list[LidarScan]) -> Verdict:
