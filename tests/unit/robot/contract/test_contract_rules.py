@@ -17,6 +17,7 @@ from sdt_tools.robot.contract.verdict import Outcome, Verdict
 START_NS = 1_700_000_000_000_000_000
 PERIOD_NS = 20_000_000
 MS = 1_000_000
+CODES = "rays without echo keep the sensor's code"
 
 
 def ranges_m(number: int) -> np.ndarray:
@@ -66,7 +67,7 @@ def test_good_scans_break_nothing() -> None:
         ({"ranges_m": np.full(RAYS, 2000.0)}, "ranges are finite metres", "are these millimetres?"),
         ({"ranges_m": np.where(np.arange(RAYS) < 9, np.inf, 2.0)}, "ranges are finite metres", "1.66% are nan or"),
         ({"ranges_m": np.full(RAYS, -1.0)}, "ranges are finite metres", "the least is -1"),
-        ({"ranges_m": np.where(np.arange(RAYS) < 9, 20.0, 2.0)}, "rays without echo keep the sensor's code", "just 20"),
+        ({"ranges_m": np.where(np.arange(RAYS) < 9, 20.0, 2.0)}, CODES, "just 20"),
         (
             {"ranges_m": np.where(np.arange(RAYS) < 9, 0.0015, 2.0)},
             "rays without echo keep the sensor's code",
@@ -114,7 +115,7 @@ def test_reading_that_raises_waits_or_gives_too_early() -> None:
     early = scans()
     early.early = 3
     assert "3 things were received after until_ns" in arrivals(early)["all up to until_ns, in order of receipt"]
-    strange = trial(scan(0), scan(1), Odometry(START_NS + 30 * MS, Pose2D(0, 0, 0)))
+    strange = trial(scan(0), scan(1), Odometry(START_NS + 30 * MS, Pose2D(0.0, 0.0, 0.0)))
     assert "it gave Odometry" in arrivals(strange)["read gives scans and log entries, nothing else"]
 
 
