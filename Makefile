@@ -4,7 +4,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 READY := $(VENV)/.ready
 
-.PHONY: demo test test-slow check lint types imports bench clean
+.PHONY: demo test test-slow check lint types imports bench pictures clean
 
 demo: $(READY)
 	$(BIN)/sdt demo --out analysis/demo
@@ -29,6 +29,9 @@ imports: $(READY)
 
 bench: $(READY)
 	$(BIN)/python -m pytest tests/bench --benchmark-enable --benchmark-only -q --jaxtyping-packages= -p no:xdist
+
+pictures: demo
+	PYTHONPATH=tests/e2e $(BIN)/python tests/e2e/take_pictures.py analysis/demo/model/follow-0
 
 $(READY): pyproject.toml constraints.txt
 	test -x $(BIN)/python || $(PYTHON) -m venv $(VENV)

@@ -48,12 +48,13 @@ class Source(Protocol):
     def read(self, until_ns: int) -> Iterable[Received | RawPicture]:
         """Everything received after the last call and up to ``until_ns`` (inclusive), in order of ``received_ns``.
 
-        Pictures may come raw: whoever records encodes them, beside what else it does.
+        Pictures may come raw: whoever records encodes them, beside what else it does. In real time this runs in a
+        thread of its own; where it does not come back the robot is stopped, and in the end the source is given up.
         """
         ...
 
     def close(self) -> None:
-        """Release what the source holds; may be called twice."""
+        """Release what the source holds; may be called twice, and while ``read`` hangs."""
         ...
 
 
@@ -62,7 +63,7 @@ class Actuator(Protocol):
     """Something that moves."""
 
     def command(self, twist: Twist) -> None:
-        """Drive with ``twist`` until told otherwise."""
+        """Drive with ``twist`` until told otherwise; may be called while a source that is the same object is read."""
         ...
 
 

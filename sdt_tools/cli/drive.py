@@ -111,7 +111,7 @@ def _drive(config: "SceneDriveConfig", witness: "Witness", record: Path | None, 
 
     follow = f"policy:{config.follow}" if Path(config.follow).is_dir() else config.follow
     network = None if config.vision is None else load_vision_checkpoint(Path(config.vision))
-    streams = viewer_observers(how.viewer, config.scene.motions)
+    streams = viewer_observers(how.viewer, config.scene.motions, config.realtime)
 
     def driver_of(source: "SceneSource") -> "Driver":
         return make_driver(follow, source, "--follow", "a follow network's folder, expert or constant:CLASS")

@@ -70,6 +70,9 @@ def edit(
     )
     beside = None
     if viewer:
+        from sdt_tools.cli.seat import keep_rerun_quiet
+
+        keep_rerun_quiet()
         from sdt_tools.view.beside import RerunBeside
 
         beside = RerunBeside.in_window()

@@ -127,7 +127,7 @@ def _record_one(config: "SceneRecordingConfig", out: Path, how: Live) -> "Record
     from sdt_tools.cli.seat import seat, viewer_observers
     from sdt_tools.recording.live.scene_session import record_scene
 
-    observers = viewer_observers(how.viewer, config.scene.motions)
+    observers = viewer_observers(how.viewer, config.scene.motions, config.realtime)
     if not how.seated:
         with recording_progress(f"recording {out.name}") as progress:
             return record_scene(config, out, make_driver, observers(), progress)

@@ -37,7 +37,7 @@ def record_takes(config: "SceneTakesConfig", folder: Path, resume: bool, how: Li
     from sdt_tools.recording.live.scene_takes import record_scene_takes
     from sdt_tools.recording.live.session_folder import ChangedConfigError
 
-    observers = viewer_observers(how.viewer, config.scene.motions)
+    observers = viewer_observers(how.viewer, config.scene.motions, config.realtime)
     try:
         if how.seated:
             return _drive_takes(config, folder, resume, how, observers)

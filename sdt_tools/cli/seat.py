@@ -1,5 +1,6 @@
 """A person's seat before a recording: the cockpit with its hand, its drivers, and Rerun beside it."""
 
+import os
 import sys
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import closing, contextmanager, nullcontext
@@ -82,12 +83,27 @@ def seat_beside(
         yield cockpit, seated
 
 
-def viewer_observers(wanted: bool, motions: "MotionConfig") -> "Callable[[], Sequence[Observer]]":
-    """Makes what streams to Rerun, for each world anew, in one window. Raises ViewerError where none opens."""
+def viewer_observers(wanted: bool, motions: "MotionConfig", realtime: bool) -> "Callable[[], Sequence[Observer]]":
+    """Makes what streams to Rerun, for each world anew, in one window; in real time it never holds up the recording.
+
+    Raises ViewerError where no window opens.
+    """
     if not wanted:
         return tuple
+    keep_rerun_quiet()
+    from sdt_tools.view.aside import Aside
     from sdt_tools.view.observer import RerunObserver
     from sdt_tools.view.viewer import open_window, viewer_url
 
     url = viewer_url(open_window())
-    return lambda: [RerunObserver.to_viewer(url, motions)]
+
+    def observers() -> "Sequence[Observer]":
+        observer = RerunObserver.to_viewer(url, motions)
+        return [Aside(observer) if realtime else observer]
+
+    return observers
+
+
+def keep_rerun_quiet() -> None:
+    """To be called before Rerun is imported: what it logs of a viewer that is gone would lie across the screen."""
+    os.environ.setdefault("RUST_LOG", "off")

@@ -17,6 +17,7 @@ from sdt_tools.recording.live.interrupt import Interrupt, deferred_interrupt
 from sdt_tools.recording.live.loop import LiveLoop
 from sdt_tools.recording.live.outcome import Ending, RecordingProgress, RecordingSummary
 from sdt_tools.recording.live.pace import paced
+from sdt_tools.recording.live.reading import reading_of
 from sdt_tools.recording.live.record import record
 from sdt_tools.recording.writer import RecordingWriter
 
@@ -116,7 +117,8 @@ def _drive_unrecorded(
     pace = paced(source.start_ns, rates.scan_hz, clock)
     recorder = _Unrecorded(source.start_ns, seconds, control, lambda: pace.missed + decisions.missed)
     encoder = PictureEncoder(behind=clock is not None)
-    loop = LiveLoop(source, stopwatch, decisions, pace, observers, recorder, progress, encoder)
+    reading = reading_of(source, pace.takes_long, clock is not None)
+    loop = LiveLoop(source, stopwatch, decisions, pace, observers, recorder, progress, encoder, reading)
     started_s = perf_counter()
     try:
         ending = loop.run(interrupt)

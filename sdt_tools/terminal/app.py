@@ -5,16 +5,18 @@ import os
 import signal
 from collections.abc import Iterable
 from contextlib import suppress
-from typing import ClassVar, Generic, TypeVar
+from typing import ClassVar, Final, Generic, TypeVar
 
 from textual import events
 from textual.app import App
 from textual.binding import BindingType
 from textual.screen import ModalScreen
 from textual.widget import Widget
-from textual.widgets import Static
+from textual.widgets import Input, Static
 
 ResultT = TypeVar("ResultT")
+
+_LOOK_S: Final = 0.005
 
 
 def follow_the_terminal() -> None:
@@ -55,12 +57,46 @@ class TerminalApp(App[ResultT], Generic[ResultT]):
     ENABLE_COMMAND_PALETTE = False
     BINDINGS: ClassVar[list[BindingType]] = [("ctrl+c", "quit")]
 
+    URGENT: ClassVar[frozenset[str]] = frozenset()
+    """Keys that do not wait until those before them are done with."""
+
     terminated = False
     """Whether SIGTERM has ended it; the terminal is given back first."""
 
     def on_mount(self) -> None:
-        """Listen to SIGTERM."""
+        """Listen to SIGTERM, and to keys."""
         self.listen_to_signals()
+        self._typed: asyncio.Queue[events.Key] = asyncio.Queue()
+        self.run_worker(self._take_keys())
+
+    async def on_event(self, event: events.Event) -> None:
+        """Keys wait for those before them."""
+        if isinstance(event, events.Key) and not event.is_forwarded and event.key not in self.URGENT:
+            self._typed.put_nowait(event)
+        else:
+            await super().on_event(event)
+
+    async def _take_keys(self) -> None:
+        """One key after the other, each to what the one before it has opened or closed.
+
+        A terminal that was late, as over a slow connection, sends many at once: none of a note may reach the screen
+        below, where it means something else.
+        """
+        while True:
+            key = await self._typed.get()
+            while not self.screen.is_mounted or self._opens():
+                await asyncio.sleep(_LOOK_S)
+            screen, target = self.screen, self.focused or self.screen
+            await super().on_event(key)
+            done = asyncio.Event()
+            target.call_later(done.set)
+            while not done.is_set() and screen is self.screen:
+                with suppress(TimeoutError):
+                    await asyncio.wait_for(done.wait(), _LOOK_S)
+
+    def _opens(self) -> bool:
+        """Whether the screen has something to type in that does not listen yet."""
+        return self.focused is None and bool(self.screen.query(Input))
 
     def listen_to_signals(self) -> None:
         """Have SIGTERM end the app, as quitting does."""

@@ -8,8 +8,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from labeling_rig import QUIT, RIGHT, start_labeling
+from labeling_rig import frame_shown
 from pytest_benchmark.fixture import BenchmarkFixture
+from terminal_rig import QUIT, RIGHT, start_sdt
 
 from sdt_tools.clock import FAST_EPOCH_NS
 from sdt_tools.frames import RAYS, CameraImage, LidarScan, Received
@@ -87,7 +88,7 @@ def test_a_key_until_the_terminal_shows_it(
     keys = KEYS if benchmark.enabled else 3
     with Recording.open(path) as recording:
         frames = len(recording.frames(LIDAR_SCAN))
-    terminal = start_labeling(path, "--labels", tmp_path, "--labeler", "anna", columns=columns, lines=lines)
+    terminal = start_sdt("label", "edit", path, "--labels", tmp_path, "--labeler", "anna", columns=columns, lines=lines)
     terminal.wait_for("? keys")
     terminal.press("f2")
     terminal.wait_for("CARRY")
@@ -102,7 +103,7 @@ def test_a_key_until_the_terminal_shows_it(
             terminal.shown = b""
             begin_s = time.perf_counter()
             terminal.press(RIGHT)
-            while terminal.frame_shown(frames) != row:
+            while frame_shown(terminal, frames) != row:
                 select.select([terminal.master], [], [], 1.0)
             took_s.append(time.perf_counter() - begin_s)
         return took_s

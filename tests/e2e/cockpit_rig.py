@@ -1,71 +1,13 @@
-"""A terminal with the cockpit in it, and somebody who drives."""
+"""What a drive in the cockpit has left, and the same drive again."""
 
-import os
-import pty
-import subprocess
-import sys
-import termios
-import time
 from collections.abc import Sequence
-from contextlib import suppress
-from fcntl import ioctl
 from pathlib import Path
-from struct import pack
-
-from labeling_rig import TAKE_OVER, LabelingTerminal, terminal_environment
 
 from sdt_tools.frames import MotionClass, MotionCommand, Odometry, Received
 from sdt_tools.recording.live.decide import STOP
 from sdt_tools.recording.reader import Recording
 from sdt_tools.scene.scenario import layout_for
 from sdt_tools.scene.source import SceneSource
-
-KEY_PERIOD_S = 0.05
-DEAF_TO_HANGUP = "import signal; signal.signal(signal.SIGHUP, signal.SIG_IGN); "
-
-
-class CockpitTerminal(LabelingTerminal):
-    """``sdt record scene`` in the foreground of a terminal."""
-
-    def hold(self, key: str, seconds: float) -> None:
-        """Keep a key down: it comes again and again."""
-        end_s = time.monotonic() + seconds
-        while time.monotonic() < end_s:
-            self.press(key)
-            self.look()
-            time.sleep(KEY_PERIOD_S)
-
-    def rest(self, seconds: float) -> None:
-        """No key."""
-        end_s = time.monotonic() + seconds
-        while time.monotonic() < end_s:
-            self.look()
-            time.sleep(KEY_PERIOD_S)
-
-    def hang_up(self) -> int:
-        """The connection breaks; when."""
-        os.close(self.slave)
-        os.close(self.master)
-        return time.time_ns()
-
-    def close(self) -> None:
-        self.process.kill()
-        self.process.wait()
-        for descriptor in (self.master, self.slave):
-            with suppress(OSError):  # it has hung up
-                os.close(descriptor)
-
-
-def start_recording(*arguments: object, before: str = "", columns: int = 80, lines: int = 24) -> CockpitTerminal:
-    """The command in a new terminal; ``before`` is what Python does first."""
-    master, slave = pty.openpty()
-    ioctl(slave, termios.TIOCSWINSZ, pack("HHHH", lines, columns, 0, 0))
-    as_it_was = termios.tcgetattr(slave)
-    program = before + TAKE_OVER + "from sdt_tools.cli.app import main; main()"
-    call = [sys.executable, "-c", program, "record", "scene", *map(str, arguments)]
-    environment = terminal_environment(columns, lines)
-    process = subprocess.Popen(call, stdin=slave, stdout=slave, stderr=slave, env=environment)
-    return CockpitTerminal(master, slave, as_it_was, process)
 
 
 def messages(path: Path, *topics: str) -> list[Received]:

@@ -1,22 +1,17 @@
 """``sdt record scene --session`` at a terminal, and how signals and a hang-up end a recording."""
 
 import json
-import os
-import pty
-import select
 import signal
 import subprocess
 import sys
-import termios
 import time
 import tomllib
-from collections.abc import Callable, Iterator
-from contextlib import suppress
-from dataclasses import dataclass
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
 from mcap.reader import make_reader
+from terminal_rig import LONGEST_S, Terminal
 from typer.testing import CliRunner
 
 from sdt_tools.cli.app import app
@@ -28,7 +23,6 @@ from sdt_tools.recording.repair import repair_recording
 
 SDT = [sys.executable, "-c", "from sdt_tools.cli.app import main; main()"]
 SHORT = ["record", "scene", "--scenario", "plain", "--seed", "7", "--no-camera"]
-LONGEST_S = 60.0
 
 
 def until(happens: Callable[[], bool], what: str) -> None:
@@ -37,58 +31,6 @@ def until(happens: Callable[[], bool], what: str) -> None:
     while not happens():
         assert time.monotonic() < end_s, what
         time.sleep(0.02)
-
-
-@dataclass
-class Terminal:
-    """A terminal with a recorder in it, and whoever sits before it."""
-
-    master: int
-    slave: int
-    before: list[object]
-    process: subprocess.Popen[bytes]
-    shown: bytes = b""
-
-    def press(self, keys: str) -> None:
-        os.write(self.master, keys.encode())
-
-    def look(self) -> bytes:
-        """What has been shown so far."""
-        while select.select([self.master], [], [], 0)[0]:
-            self.shown += os.read(self.master, 1 << 16)
-        return self.shown
-
-    def end(self) -> int:
-        until(lambda: (self.look(), self.process.poll())[1] is not None, "it does not end")
-        self.look()
-        return self.process.returncode
-
-    @property
-    def restored(self) -> bool:
-        return termios.tcgetattr(self.slave) == self.before
-
-
-@pytest.fixture
-def at_terminal() -> Iterator[Callable[..., Terminal]]:
-    """Starts ``sdt`` in the foreground of a new terminal."""
-    started: list[Terminal] = []
-
-    def start(*arguments: object) -> Terminal:
-        master, slave = pty.openpty()
-        before = termios.tcgetattr(slave)
-        take_over = "import fcntl, os, termios; os.setsid(); fcntl.ioctl(0, termios.TIOCSCTTY, 0); "
-        command = [sys.executable, "-c", take_over + "from sdt_tools.cli.app import main; main()"]
-        process = subprocess.Popen([*command, *map(str, arguments)], stdin=slave, stdout=slave, stderr=slave)
-        started.append(Terminal(master, slave, before, process))
-        return started[-1]
-
-    yield start
-    for terminal in started:
-        terminal.process.kill()
-        terminal.process.wait()
-        for descriptor in (terminal.master, terminal.slave):
-            with suppress(OSError):  # a test has hung up
-                os.close(descriptor)
 
 
 def takes(folder: Path) -> list[dict[str, object]]:
@@ -109,17 +51,17 @@ def messages_in(path: Path) -> int:
 def test_takes_under_single_keys(tmp_path: Path, at_terminal: Callable[..., Terminal]) -> None:
     folder = tmp_path / "s"
     terminal = at_terminal(*SHORT, "--realtime", "--session", folder)
-    until(lambda: (terminal.look(), grows(folder / "take_001.mcap"))[1], "no take")
+    terminal.until(lambda: grows(folder / "take_001.mcap"), "no take")
     assert not terminal.restored
-    assert b"n next take" in terminal.shown
+    assert "n next take" in terminal.look()
     terminal.press("mn")
-    until(lambda: (terminal.look(), grows(folder / "take_002.mcap"))[1], "no second take")
+    terminal.until(lambda: grows(folder / "take_002.mcap"), "no second take")
     terminal.press("x")
-    until(lambda: len(takes(folder)) == 2 and bool(takes(folder)[1].get("trash")), "not discarded")
+    terminal.until(lambda: len(takes(folder)) == 2 and bool(takes(folder)[1].get("trash")), "not discarded")
     terminal.press("q")
     assert terminal.end() == 0
     assert terminal.restored
-    assert b"take_001.mcap" in terminal.shown
+    assert "take_001.mcap" in terminal.look()
     first, second = takes(folder)
     assert first["ending"] == "stopped"
     assert messages_in(folder / "take_001.mcap") == first["messages"]
@@ -134,7 +76,7 @@ def test_a_signal_gives_the_terminal_back(
 ) -> None:
     folder = tmp_path / "s"
     terminal = at_terminal(*SHORT, "--realtime", "--session", folder)
-    until(lambda: (terminal.look(), grows(folder / "take_001.mcap"))[1], "no take")
+    terminal.until(lambda: grows(folder / "take_001.mcap"), "no take")
     terminal.process.send_signal(number)
     assert terminal.end() == (0 if number == signal.SIGINT else 128 + number)
     assert terminal.restored
@@ -144,9 +86,8 @@ def test_a_signal_gives_the_terminal_back(
 def test_a_terminal_that_hangs_up_leaves_a_whole_take(tmp_path: Path, at_terminal: Callable[..., Terminal]) -> None:
     folder = tmp_path / "s"
     terminal = at_terminal(*SHORT, "--realtime", "--session", folder)
-    until(lambda: (terminal.look(), grows(folder / "take_001.mcap"))[1], "no take")
-    os.close(terminal.slave)
-    os.close(terminal.master)
+    terminal.until(lambda: grows(folder / "take_001.mcap"), "no take")
+    terminal.hang_up()
     assert terminal.process.wait(LONGEST_S) == 128 + signal.SIGHUP
     (take,) = takes(folder)
     assert take["ending"] == "hangup"
@@ -156,13 +97,13 @@ def test_a_terminal_that_hangs_up_leaves_a_whole_take(tmp_path: Path, at_termina
 def test_a_pause_of_a_take_that_was_killed_is_no_gap(tmp_path: Path, at_terminal: Callable[..., Terminal]) -> None:
     path = tmp_path / "s" / "take_001.mcap"
     terminal = at_terminal(*SHORT, "--realtime", "--session", path.parent)
-    until(lambda: (terminal.look(), grows(path))[1], "no take")
+    terminal.until(lambda: grows(path), "no take")
     terminal.press(" ")
-    until(lambda: b"paused" in terminal.look(), "not paused")
+    terminal.wait_for("paused")
     time.sleep(1.5)  # as long as the pause is to be
     size = path.stat().st_size
     terminal.press(" ")
-    until(lambda: (terminal.look(), path.stat().st_size > size + 50_000)[1], "it does not go on")
+    terminal.until(lambda: path.stat().st_size > size + 50_000, "it does not go on")
     terminal.process.kill()
     terminal.process.wait()
     cut = inspect_recording(path)
@@ -241,6 +182,8 @@ def test_what_led_to_a_change_of_mode_is_kept_without_a_terminal_too(tmp_path: P
         (["--out", "x.mcap", "--resume"], "--resume needs --session"),
         (["--out", "x.mcap", "--keep-last", "30s"], "--keep-last needs --session"),
         (["--session", "s", "--keep-last", "soon"], "--keep-last soon: no length of time; write it as 30s or 2min"),
+        (["--session", "s", "--driver", "policy:nowhere"], "nowhere"),
+        (["--session", "s", "--scenario", "nowhere"], "nowhere"),
         (["--session", "s", "--resume"], "s: no session to resume; leave --resume out to begin one"),
     ],
 )

@@ -11,7 +11,7 @@ from textual.binding import BindingType
 from textual.containers import Horizontal, Vertical
 from textual.screen import ModalScreen
 from textual.widget import Widget
-from textual.widgets import Input, OptionList, Static
+from textual.widgets import OptionList, Static
 from textual.widgets.option_list import Option
 
 from sdt_tools.clock import SECOND_NS
@@ -21,6 +21,7 @@ from sdt_tools.labeling.app.strip import AGAINST, BRIGHT, CONFLICT, DIM, SUSPECT
 from sdt_tools.labeling.app.words import clock
 from sdt_tools.labeling.review import Doubt, ReviewItem, review_queue
 from sdt_tools.labeling.vocabulary import LabelKind
+from sdt_tools.terminal.line import Line
 from sdt_tools.terminal.raster import style
 
 _SIGNS: Final = {Doubt.CONFLICT: ("!", CONFLICT), Doubt.SUSPECT: ("?", SUSPECT), Doubt.PRELABEL: ("≠", AGAINST)}
@@ -44,14 +45,14 @@ class JumpDialog(ModalScreen[int | None]):
         """A line to type in."""
         with Vertical():
             yield Static("Go to 12.5 or 1:02.5 · +3 or -3 seconds · #120 · 50%", markup=False)
-            yield Input(id="place")
+            yield Line(self._go)
 
-    @on(Input.Submitted)
-    def go(self, event: Input.Submitted) -> None:
+    def _go(self, text: str) -> None:
         """Give the frame, or say what is meant."""
-        place = place_of(event.value, self._state)
+        place = place_of(text, self._state)
         if place is None:
-            self.query_one(Static).update(f"'{event.value[:20]}' is no time: 12.5 · 1:02.5 · +3 · -3 · #120 · 50%")
+            self.query_one(Static).update(f"'{text[:12]}' is no time: 12.5 · 1:02.5 · +3 · #120 · 50%")
+            self.query_one(Line).action_select_all()  # what is typed next takes its place
         elif self.is_current:  # a key that repeats must not close what is below
             self.dismiss(place)
 

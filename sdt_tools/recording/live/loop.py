@@ -1,6 +1,6 @@
 """The live loop: reads a source, asks a driver, moves the robot, hands everything to whoever records it."""
 
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from contextlib import suppress
 from time import perf_counter
 from typing import Final, Protocol, runtime_checkable
@@ -14,6 +14,7 @@ from sdt_tools.recording.live.encoder import PictureEncoder
 from sdt_tools.recording.live.interrupt import Interrupt
 from sdt_tools.recording.live.outcome import ENDING_BY_SIGNAL, Ending, RecordingProgress
 from sdt_tools.recording.live.pace import Pace
+from sdt_tools.recording.live.reading import DEAD_S, DirectReading, Reading
 from sdt_tools.recording.messages.topics import CAMERA_IMAGE, topic_of
 
 _PROGRESS_S: Final = 0.25
@@ -77,6 +78,7 @@ class LiveLoop:
     """One source under way. ``run`` once, then ``close``: together they leave the robot standing, come what may.
 
     Raw pictures go through ``encoder``, which encodes at once unless another is given, and pass when they are encoded.
+    The source is read by ``reading``, in this thread unless another is given.
     """
 
     def __init__(
@@ -89,8 +91,10 @@ class LiveLoop:
         recorder: Recorder,
         progress: Callable[[RecordingProgress], None] | None = None,
         encoder: PictureEncoder | None = None,
+        reading: Reading | None = None,
     ) -> None:
         self._source = source
+        self._reading = reading or DirectReading(source, pace.takes_long)
         self._actuator = actuator
         self._decisions = decisions
         self._pace = pace
@@ -99,8 +103,7 @@ class LiveLoop:
         self._progress = progress
         self._encoder = encoder or PictureEncoder(behind=False)
         self._now_ns = source.start_ns
-        self._under_way: tuple[int, Iterator[Received | RawPicture]] | None = None
-        """What is being read, and up to when."""
+        self._is_silent = False
         self._reported_s = 0.0
         self._stands = False
 
@@ -149,7 +152,7 @@ class LiveLoop:
                 self._stand_still(told=False)
         finally:
             self._encoder.close()
-            self._source.close()
+            self._reading.close()
             for observer in self._observers:
                 observer.close()
 
@@ -200,25 +203,36 @@ class LiveLoop:
     def _read(self, until_ns: int) -> bool:
         """Read the source up to ``until_ns``, or as far as that does not take long; whether all is read.
 
-        Where it is not, the next call goes on from there, and it is as early as what was read last.
+        Where it is not, the next call goes on from there, and it is as early as what was read last. Raises what the
+        source has raised, RunError where it has been silent for too long.
         """
-        while True:
-            if self._under_way is None:
-                self._under_way = until_ns, iter(self._source.read(until_ns))
-            goal_ns, reading = self._under_way
-            for sensed in reading:
-                self._now_ns = max(self._now_ns, sensed.received_ns)
-                if isinstance(sensed, RawPicture):
-                    self._encoder.put(sensed)
-                else:
-                    self._take(sensed)
-                self._take_pictures()
-                if self._pace.takes_long():
-                    return False
-            self._under_way = None
-            if goal_ns >= until_ns:
-                self._now_ns = goal_ns
-                return True
+        part = self._reading.read(until_ns)
+        for sensed in part.sensed:
+            self._now_ns = max(self._now_ns, sensed.received_ns)
+            if isinstance(sensed, RawPicture):
+                self._encoder.put(sensed)
+            else:
+                self._take(sensed)
+            self._take_pictures()
+        if part.failure is not None:
+            raise part.failure
+        self._mind_silence()
+        if part.read_to_ns is None:
+            return False
+        self._now_ns = part.read_to_ns
+        return part.read_to_ns >= until_ns
+
+    def _mind_silence(self) -> None:
+        """Have the robot stand while the source does not come back. Raises RunError where it will not any more."""
+        silent_s, name = self._reading.silent_s, self._source.info.source
+        if not self._is_silent and silent_s > 0:
+            self._stand_still(told=True)
+            self._log(LogLevel.WARNING, f"the {name} does not answer: the robot stands until it does")
+        elif self._is_silent and silent_s == 0:
+            self._log(LogLevel.INFO, f"the {name} answers again")
+        self._is_silent = silent_s > 0
+        if silent_s > DEAD_S:
+            raise RunError(f"the {name} has not answered for {silent_s:.0f} s; what was recorded before is kept")
 
     def _take_pictures(self) -> None:
         """Those that are encoded by now, and those that were dropped, in their order."""

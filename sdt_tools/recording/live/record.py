@@ -18,6 +18,7 @@ from sdt_tools.recording.live.loop import LiveLoop
 from sdt_tools.recording.live.outcome import Ending, RecordingProgress, RecordingSummary
 from sdt_tools.recording.live.pace import paced
 from sdt_tools.recording.live.pressure import QueueLimits
+from sdt_tools.recording.live.reading import reading_of
 from sdt_tools.recording.live.sink import DirectSink, QueuedSink
 from sdt_tools.recording.live.take import Take, Tally
 from sdt_tools.recording.writer import RecordingWriter
@@ -64,7 +65,8 @@ def record(
 
     encoder = PictureEncoder(realtime, limits, encode)
     recorder = _OneTake(Take(sink, source.start_ns, seconds, rates, tally), writer, control)
-    loop = LiveLoop(source, actuator, decisions, pace, observers, recorder, progress, encoder)
+    reading = reading_of(source, pace.takes_long, realtime)
+    loop = LiveLoop(source, actuator, decisions, pace, observers, recorder, progress, encoder, reading)
     recorder.settle = loop.settle
     try:
         if interrupt is not None:

@@ -20,6 +20,7 @@ from sdt_tools.recording.live.loop import LiveLoop
 from sdt_tools.recording.live.outcome import ENDING_BY_SIGNAL, Ending, RecordingProgress
 from sdt_tools.recording.live.pace import paced
 from sdt_tools.recording.live.perturb import perturbation_of
+from sdt_tools.recording.live.reading import reading_of
 from sdt_tools.recording.live.scene_session import MakeDriver, SceneRecordingConfig, warm_up
 from sdt_tools.recording.live.session_folder import SessionFolder, SessionRecord
 from sdt_tools.recording.live.take import Tally
@@ -69,6 +70,9 @@ def record_scene_takes(
     ChangedConfigError where it was begun with another config; else what ``record_scene`` raises.
     """
     session_id = random_id() if config.realtime else derived_id(dump_config(config))
+    make_driver(
+        config.driver, SceneSource(layout_for(config.scenario, config.seed), config.scene)
+    )  # or nothing is begun
     with nullcontext(interrupt) if interrupt is not None else deferred_interrupt() as interrupt:
         session = SessionFolder.resume(folder, config) if resume else SessionFolder.create(folder, config, session_id)
         cut_off = session.cut_off
@@ -126,7 +130,8 @@ def _play_world(
         return Tally(decisions.decisions, decisions.forced, pace.missed + decisions.missed)
 
     encoder = PictureEncoder(behind=config.realtime)
-    loop = LiveLoop(source, source, decisions, pace, observers, recorder, progress, encoder)
+    reading = reading_of(source, pace.takes_long, config.realtime)
+    loop = LiveLoop(source, source, decisions, pace, observers, recorder, progress, encoder, reading)
     recorder.begin(start_ns, open_writer, tally, loop.settle)
     try:
         return loop.run(interrupt)

@@ -23,6 +23,7 @@ class CockpitApp(TerminalApp[None]):
     """Shows ``cockpit`` until ``recording`` is done. Esc stops the robot whatever is open over the screen."""
 
     TITLE = "sdt record"
+    URGENT = frozenset({"escape"})
     BINDINGS: ClassVar[list[BindingType]] = [Binding("escape", "emergency", priority=True)]
 
     def __init__(self, cockpit: Cockpit, recording: Recording[object]) -> None:

@@ -5,15 +5,15 @@ from typing import ClassVar
 
 from rich.style import Style
 from rich.text import Text
-from textual import on
 from textual.binding import BindingType
 from textual.containers import Horizontal, Vertical
 from textual.screen import ModalScreen
 from textual.widget import Widget
-from textual.widgets import Input, Static
+from textual.widgets import Static
 
 from sdt_tools.teleop.app.keys import GROUPS, Key
 from sdt_tools.teleop.app.words import BRIGHT, DIM, bold, ink
+from sdt_tools.terminal.line import Line
 
 _DRIVE = (
     ("↖ ↑ ↗", "q w e   7 8 9   ← ↑ →"),
@@ -51,7 +51,7 @@ class NoteDialog(ModalScreen[str]):
     CSS = """
     NoteDialog { align: center bottom; background: #000000 0%; }
     NoteDialog > Vertical { background: #1a1e28; border: round #40a9ff; padding: 0 1; width: 100%; height: auto; }
-    NoteDialog Input { border: none; height: 1; padding: 0; background: #1a1e28; }
+    NoteDialog Line { border: none; height: 1; padding: 0; background: #1a1e28; }
     """
 
     def __init__(self, name: str) -> None:
@@ -62,15 +62,12 @@ class NoteDialog(ModalScreen[str]):
         """A line to type in."""
         with Vertical():
             yield Static(f"{self._mark} is set. A note on it? Enter ends it · Esc is the emergency stop", markup=False)
-            note = Input(id="note", max_length=200)
-            note.cursor_blink = False
-            yield note
+            yield Line(self._give)
 
-    @on(Input.Submitted)
-    def give(self, event: Input.Submitted) -> None:
-        """Give the note, once: a key that repeats must not close what is below."""
+    def _give(self, note: str) -> None:
+        """Once: a key that repeats must not close what is below."""
         if self.is_current:
-            self.dismiss(event.value.strip())
+            self.dismiss(note.strip())
 
 
 def _driving() -> Text:

@@ -58,8 +58,8 @@ def test_the_same_seed_is_the_same_course() -> None:
 
 
 def test_the_expert_finishes_most_of_them(courses: list) -> None:
-    runs = drive_closed_loop(courses[:12], policy_for("expert"), ClosedLoopConfig())
-    assert sum(run.outcome is Outcome.OK for run in runs) >= 7
+    runs = drive_closed_loop(courses[:5], policy_for("expert"), ClosedLoopConfig())
+    assert sum(run.outcome is Outcome.OK for run in runs) >= 3
 
 
 def _total_turn(path: tuple) -> float:

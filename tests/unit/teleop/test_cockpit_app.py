@@ -9,8 +9,9 @@ from time import sleep
 
 import pytest
 from cockpit_samples import PROGRESS, Clock, Operator, cockpit, recording, seen, wanted
+from textual import events
 from textual.pilot import Pilot
-from textual.widgets import Input, Static
+from textual.widgets import Static
 
 from sdt_tools.errors import RunError
 from sdt_tools.frames import Gesture, LogEntry, LogLevel, MotionClass, Received
@@ -22,6 +23,7 @@ from sdt_tools.teleop.app.keys import ACTIONS, GROUPS, MOTION_KEYS
 from sdt_tools.teleop.app.screen import CockpitScreen
 from sdt_tools.teleop.cockpit import Cockpit, Recording
 from sdt_tools.terminal.app import TooSmall
+from sdt_tools.terminal.line import Line
 
 Use = Callable[[CockpitApp, Pilot], Awaitable[None]]
 
@@ -163,7 +165,7 @@ def test_enter_that_repeats_closes_what_is_open_and_nothing_below(opened: str) -
             if isinstance(dialog, HelpDialog):
                 dialog.action_close()
             else:
-                await dialog.query_one(Input).action_submit()
+                await dialog.query_one(Line).on_key(events.Key("enter", None))
         await pilot.pause()
         assert isinstance(app.screen, CockpitScreen)
 

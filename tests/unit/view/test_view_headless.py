@@ -11,9 +11,14 @@ import psutil
 import pytest
 from conftest import Viewed
 from rerun.experimental import ViewerClient
+from typer.testing import CliRunner
 from view_samples import MAGENTA_BGR, scan_ns
 
+from sdt_tools.cli.app import app
+from sdt_tools.labeling.app.desk import Desk, Task
+from sdt_tools.labeling.vocabulary import LabelKind
 from sdt_tools.view import viewer as viewer_module
+from sdt_tools.view.beside import RerunBeside
 from sdt_tools.view.observer import RerunObserver
 from sdt_tools.view.palette import LABEL, OPERATOR, STATUSES, ZONE, Rgb
 from sdt_tools.view.screenshot import screenshot, show
@@ -174,3 +179,39 @@ def test_without_a_graphics_driver_the_message_says_what_to_install(monkeypatch:
         headless_viewer(),
     ):
         pass
+
+
+@pytest.mark.slow
+def test_what_is_recorded_and_what_is_labelled_is_seen(
+    viewer: ViewerClient, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, screen: Screen
+) -> None:
+    """``sdt record scene --viewer``, then a frame of that recording as ``sdt label edit --viewer`` shows it."""
+    port = int(viewer.url.removeprefix("rerun+http://127.0.0.1:").removesuffix("/proxy"))
+    monkeypatch.setattr(viewer_module, "open_window", lambda: port)
+    known = {found.store_id for found in viewer.get_state().recordings}
+
+    def look_at_the_new_one() -> None:
+        (live,) = [found for found in viewer.get_state().recordings if found.store_id not in known]
+        known.add(live.store_id)
+        viewer.set_location(live.location)
+
+    path = tmp_path / "drive.mcap"
+    call = ["record", "scene", "--realtime", "--viewer", "--seed", "7", "--seconds", "0.6", "--out", str(path)]
+    assert CliRunner().invoke(app, call).exit_code == 0
+    look_at_the_new_one()
+    assert len(where(screen("Scan"), STATUSES["unlabeled"])) > 200
+
+    task = Task(path, LabelKind.MOTION, tmp_path / "labels", "anna")
+    beside = RerunBeside(port)
+    with Desk(task) as desk:
+        stamps_ns = desk.opened.labels.stamps_ns.tolist()
+        pictures = []
+        for row in (20, 5, 20):
+            beside.show(desk.messages_at(stamps_ns[row]), stamps_ns[row])
+            if not pictures:
+                look_at_the_new_one()
+            pictures.append(screen("Scan"))
+    beside.close()
+    assert len(where(pictures[0], STATUSES["unlabeled"])) > 200
+    assert (pictures[0] != pictures[1]).any()
+    assert (pictures[0] == pictures[2]).all()

@@ -14,6 +14,7 @@ from sdt_tools.replay.replay import replay
 SMALL = Material(recordings=16, frames=40)
 
 
+@pytest.mark.slow
 def test_the_same_seed_gives_the_same_counts_however_many_processes() -> None:
     seen: list[tuple[int, int]] = []
     documents = [
