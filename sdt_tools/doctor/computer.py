@@ -123,23 +123,24 @@ def terminal() -> Iterator[Finding]:
     """Whether the cockpit and the labeling app find room and colours."""
     from rich.console import Console
 
-    if not sys.stderr.isatty():
+    stream = sys.__stderr__ or sys.stderr  # a spinner may stand in for the other
+    if not stream.isatty():
         yield ok(
             "terminal", "none", "this output goes to a file or a pipe; run it in a terminal to have that looked at"
         )
         return
-    size = os.get_terminal_size(sys.stderr.fileno())
+    size = os.get_terminal_size(stream.fileno())
     seen = f"{size.columns} × {size.lines}, {os.environ.get('TERM', 'no TERM')}"
     if size.columns < 80 or size.lines < 24:
         yield warn("terminal", "size", seen, "cockpit and labeling need 80 × 24; enlarge it")
     else:
         yield ok("terminal", "size", seen)
-    colors = Console(stderr=True).color_system
+    colors = Console(file=stream).color_system
     if colors in ("256", "truecolor"):
         yield ok("terminal", "colours", colors)
     else:
         yield warn("terminal", "colours", colors or "none", "set COLORTERM=truecolor, or use another terminal")
-    encoding = sys.stderr.encoding.lower()
+    encoding = stream.encoding.lower()
     if "utf" in encoding:
         yield ok("terminal", "characters", encoding)
     else:

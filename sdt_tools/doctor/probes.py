@@ -69,10 +69,15 @@ class _Part:
 
 def examine(asked: Asked, limit_s: float = LIMIT_S) -> list[Finding]:
     """Everything that was found, by section, without the names of users; within ``limit_s`` or a second more."""
-    running = [_Running(part) for part in _parts(asked)]
+    found = [*computer.machine(), *rerun.display(), *computer.terminal()]
     end_s = monotonic() + limit_s
-    here = [*computer.machine(), *rerun.display(), *computer.terminal()]
-    found = here + [finding for one in running for finding in one.findings(end_s)]
+    running = [_Running(part) for part in _parts(asked)]
+    try:
+        for one in running:
+            found += one.findings(end_s)
+    finally:  # interrupted, too
+        for one in running:
+            one.end()
     return [without_names(one) for one in sorted(found, key=lambda one: _SECTIONS.index(one.section))]
 
 
@@ -113,17 +118,21 @@ class _Running:
         )
 
     def findings(self, end_s: float) -> list[Finding]:
-        """What it has found, at ``end_s`` at the latest; it is ended then, with whatever it has started."""
+        """What it has found, at ``end_s`` at the latest; it is ended then."""
         late = False
         try:
             self.process.wait(max(end_s - monotonic(), 0.01))
         except subprocess.TimeoutExpired:
             late = True
+        self.end()
+        return self._read(late)
+
+    def end(self) -> None:
+        """End it, with whatever it has started; may be called twice."""
         with suppress(ProcessLookupError, PermissionError):
             os.killpg(self.process.pid, signal.SIGKILL)
         with suppress(subprocess.TimeoutExpired):  # one that even this does not end hangs in the system
             self.process.wait(_ENDS_S)
-        return self._read(late)
 
     def _read(self, late: bool) -> list[Finding]:
         found = []
