@@ -7,9 +7,9 @@ gamepad that goes away is an emergency stop.
 
 import math
 import threading
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Final, Protocol, runtime_checkable
+from typing import Final, Protocol, cast, runtime_checkable
 
 from sdt_tools.errors import UsageError
 from sdt_tools.frames import MotionClass
@@ -168,6 +168,13 @@ class Gamepad:
             action()
 
 
+class _Ends(Protocol):
+    """What evdev tells of an axis; its own types leave it out."""
+
+    min: int
+    max: int
+
+
 def open_gamepad(hand: Hand) -> Gamepad:
     """The first gamepad that is connected, at work. Raises UsageError without one, or without the package."""
     try:
@@ -180,7 +187,8 @@ def open_gamepad(hand: Hand) -> Gamepad:
             device = evdev.InputDevice(path)
         except OSError:
             continue  # not ours to read
-        axes = {code: Axis(info.min, info.max) for code, info in device.capabilities(absinfo=True).get(EV_ABS, ())}
+        absolute = cast("Mapping[int, Sequence[tuple[int, _Ends]]]", device.capabilities(absinfo=True))
+        axes = {code: Axis(info.min, info.max) for code, info in absolute.get(EV_ABS, ())}
         if BTN_SOUTH in device.capabilities().get(EV_KEY, ()) and {ABS_X, ABS_Y} <= set(axes):
             return Gamepad(device, axes, hand)
         device.close()
