@@ -9,7 +9,7 @@ FAST_EPOCH_NS = 1_735_689_600_000_000_000
 SECOND_NS = 1_000_000_000
 
 LATE_SHARE = 0.5
-"""Of a period: what comes later than this after its time is late. Less is what any scheduler does, and harms nothing."""
+"""Of a period: what comes later than this after its time is late. Less is what any scheduler does."""
 
 
 class HostClock:

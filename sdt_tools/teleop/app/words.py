@@ -52,8 +52,8 @@ def heading(cockpit: Cockpit, view: View, width: int) -> Text:
 
 def _take(progress: RecordingProgress | None) -> Text:
     if progress is None:
-        # the scene is compiled and its pictures are painted; numba keeps what it has compiled
-        return Text("getting ready … (after an install it compiles the scene, once: about 20 s)", style(WARM))
+        # numba keeps what it has compiled of the scene
+        return Text("getting ready … a scene compiles once after an install: 20 s", style(WARM))
     clock = f"{int(progress.recorded_s) // 60}:{progress.recorded_s % 60:04.1f}"
     if progress.total_s is not None:
         clock += f" of {progress.total_s:g} s"
