@@ -36,6 +36,7 @@ VERBS = (
     "view",
     "robot",
     "paper",
+    "doctor",
 )
 """In the order of the flow. Each is a module here (``import_`` for ``import``) with a ``command``, or an ``app``."""
 

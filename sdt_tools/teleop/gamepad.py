@@ -7,9 +7,9 @@ gamepad that goes away is an emergency stop.
 
 import math
 import threading
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, replace
-from typing import Final, Protocol, cast, runtime_checkable
+from typing import Any, Final, Protocol, runtime_checkable
 
 from sdt_tools.errors import UsageError
 from sdt_tools.frames import MotionClass
@@ -49,6 +49,10 @@ class Pad(Protocol):
 
     def read_loop(self) -> Iterable[InputEvent]:
         """Events as they come, until the device goes away, which raises OSError."""
+        ...
+
+    def capabilities(self, *, absinfo: bool = True) -> dict[int, Any]:
+        """Codes of its keys and axes by type; those of axes with their limits where ``absinfo``."""
         ...
 
     def close(self) -> None:
@@ -168,32 +172,34 @@ class Gamepad:
             action()
 
 
-class _Ends(Protocol):
-    """What evdev tells of an axis; its own types leave it out."""
+def connected_gamepads() -> Iterator[Pad]:
+    """The gamepads that are connected and may be read, open. Raises ImportError without the package evdev."""
+    import evdev  # an extra: most robots have none
 
-    min: int
-    max: int
+    for path in sorted(evdev.list_devices()):
+        try:
+            device = evdev.InputDevice(path)
+        except OSError:
+            continue  # not ours to read
+        if BTN_SOUTH in device.capabilities().get(EV_KEY, ()) and {ABS_X, ABS_Y} <= set(_axes(device)):
+            yield device
+        else:
+            device.close()
 
 
 def open_gamepad(hand: Hand) -> Gamepad:
     """The first gamepad that is connected, at work. Raises UsageError without one, or without the package."""
     try:
-        import evdev  # an extra: most robots have none
+        device = next(connected_gamepads(), None)
     except ImportError:
         raise UsageError("--driver gamepad needs the package evdev; install sdt-tools[gamepad]") from None
-    paths: Sequence[str] = sorted(evdev.list_devices())
-    for path in paths:
-        try:
-            device = evdev.InputDevice(path)
-        except OSError:
-            continue  # not ours to read
-        absolute = cast("Mapping[int, Sequence[tuple[int, _Ends]]]", device.capabilities(absinfo=True))
-        axes = {code: Axis(info.min, info.max) for code, info in absolute.get(EV_ABS, ())}
-        if BTN_SOUTH in device.capabilities().get(EV_KEY, ()) and {ABS_X, ABS_Y} <= set(axes):
-            return Gamepad(device, axes, hand)
-        device.close()
-    seen = f"; {len(paths)} other input devices are there" if paths else ""
+    if device is not None:
+        return Gamepad(device, _axes(device), hand)
     raise UsageError(
-        f"--driver gamepad: no gamepad is connected, or this user may not read /dev/input{seen}; "
+        "--driver gamepad: no gamepad is connected, or this user may not read /dev/input; "
         "connect it, join the group 'input', or use --driver keyboard"
     )
+
+
+def _axes(pad: Pad) -> dict[int, Axis]:
+    return {code: Axis(info.min, info.max) for code, info in pad.capabilities(absinfo=True).get(EV_ABS, ())}

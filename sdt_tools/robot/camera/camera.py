@@ -1,7 +1,7 @@
 """A camera that is read all the time, so that what is handed out is always new."""
 
 import threading
-from typing import Final
+from typing import ClassVar, Final
 
 import cv2
 
@@ -25,6 +25,8 @@ class Camera:
     A picture's stamp is the moment it was grabbed. A camera that is lost is opened again until it is back. A video file
     plays at its own rate and then has ``finished``. Raises DeviceError where the camera does not open at first.
     """
+
+    config_model: ClassVar[type[CameraConfig]] = CameraConfig
 
     def __init__(self, config: CameraConfig, clock: HostClock | None = None) -> None:
         self.finished = False

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from enum import Enum
 from threading import Condition, Event, Thread
 from time import monotonic
-from typing import Final
+from typing import ClassVar, Final
 
 from sdt_tools.clock import SECOND_NS, HostClock
 from sdt_tools.errors import DeviceError, SdtError
@@ -67,11 +67,14 @@ class LidarStatus:
 
 
 class Lms1xx:
-    """An LMS1xx that streams. Raises DeviceError, in words, where it cannot be reached, set up, or does not send.
+    """An LMS1xx that streams. Implements Lidar.
 
-    What it received waits for ``read``, log entries on gaps and reconnects among it. Given the same ``clock`` as the
-    rest of the robot, its stamps are on the same time. ``say`` takes a line about each thing that is done at the start.
+    Raises DeviceError, in words, where it cannot be reached, set up, or does not send. What it received waits for
+    ``read``, log entries on gaps and reconnects among it. Given the same ``clock`` as the rest of the robot, its stamps
+    are on the same time. ``say`` takes a line about each thing that is done at the start.
     """
+
+    config_model: ClassVar[type[Lms1xxConfig]] = Lms1xxConfig
 
     def __init__(self, config: Lms1xxConfig, clock: HostClock | None = None, say: Say | None = None) -> None:
         self._config = config

@@ -6,7 +6,7 @@ import socket
 import threading
 from contextlib import suppress
 from time import monotonic_ns
-from typing import Final
+from typing import ClassVar, Final
 
 from sdt_tools.clock import SECOND_NS, HostClock
 from sdt_tools.emergency import EmergencyStop
@@ -33,7 +33,7 @@ _FAREWELL_S: Final = 1.0
 
 
 class P3atBase:
-    """A session with the base, kept up by a thread of its own. Implements Actuator.
+    """A session with the base, kept up by a thread of its own. Implements Base.
 
     The thread sends the newest command at once and again every ``refresh_s``, within the limits. A motion ends by
     itself when it is not commanded again for ``command_lasts_s``. Where the base falls silent, where its emergency
@@ -44,6 +44,8 @@ class P3atBase:
 
     Raises DeviceError where there is no base. ``read`` gives poses, and what there is to tell.
     """
+
+    config_model: ClassVar[type[P3atConfig]] = P3atConfig
 
     def __init__(
         self, config: P3atConfig, emergency: EmergencyStop | None = None, clock: HostClock | None = None

@@ -15,7 +15,7 @@ from sdt_tools.robot.p3at.config import P3atConfig
 from sdt_tools.robot.p3at.link import Link, LinkLostError
 from sdt_tools.robot.p3at.packets import PacketSplitter, packet
 from sdt_tools.robot.p3at.settings import BaseSettings, decode_settings
-from sdt_tools.robot.p3at.status import MOVING, STANDING
+from sdt_tools.robot.p3at.status import MOVING, STANDING, Status, decode_status
 
 _ANSWER_S: Final = 0.5
 _LOOK_S: Final = 0.05
@@ -57,7 +57,7 @@ def open_session(link: Link, config: P3atConfig, gives_up: Callable[[], bool] = 
     A session that an earlier client has left open is closed first. Raises DeviceError where no base answers within
     ``connect_s`` or ``gives_up`` says so, and LinkLostError where the wire breaks; the link stays open then.
     """
-    talk = _Talk(link, config, gives_up)
+    talk = Introduction(link, config, gives_up)
     identity = talk.synchronise()
     link.write(encode(Code.OPEN))
     settings = talk.ask_settings()
@@ -79,10 +79,10 @@ def open_session(link: Link, config: P3atConfig, gives_up: Callable[[], bool] = 
     return Session(link, talk.splitter, name, kind, model, settings)
 
 
-class _Talk:
-    """Questions and answers before the session is open."""
+class Introduction:
+    """Questions and answers that begin a session; nothing of it moves the base or switches its motors on."""
 
-    def __init__(self, link: Link, config: P3atConfig, gives_up: Callable[[], bool]) -> None:
+    def __init__(self, link: Link, config: P3atConfig, gives_up: Callable[[], bool] = lambda: False) -> None:
         self.splitter = PacketSplitter()
         self._link = link
         self._config = config
@@ -120,6 +120,14 @@ class _Talk:
                 settings = decode_settings(body)
                 if settings is not None:
                     return settings
+        return None
+
+    def overheard(self) -> Status | None:
+        """What the base says of itself, unasked; None where it says nothing, as outside of a session."""
+        for body in self._bodies(_LISTEN_S):
+            status = decode_status(body)
+            if status is not None:
+                return status
         return None
 
     def _answer(self, sync: int) -> bytes:

@@ -1,0 +1,1 @@
+"""What this computer has of all that the rest needs: looked at without changing any of it."""
