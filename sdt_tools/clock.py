@@ -8,6 +8,9 @@ FAST_EPOCH_NS = 1_735_689_600_000_000_000
 
 SECOND_NS = 1_000_000_000
 
+LATE_SHARE = 0.5
+"""Of a period: what comes later than this after its time is late. Less is what any scheduler does."""
+
 
 class HostClock:
     """The monotonic clock plus an offset to UTC fixed once: a corrected wall clock does not disturb a session."""
@@ -26,10 +29,10 @@ class HostClock:
 
 
 class Pacer:
-    """Releases its caller once a period and counts the periods that the caller came too late for.
+    """Releases its caller once a period and counts the deadlines that were missed by more than ``LATE_SHARE`` of it.
 
-    A late caller is released at once and the schedule keeps its phase: the deadlines already past are counted as missed
-    and skipped, never made up for in a burst.
+    A late caller is released at once and the schedule keeps its phase: the deadlines a whole period ago are counted as
+    missed and skipped, never made up for in a burst.
     """
 
     def __init__(
@@ -49,12 +52,9 @@ class Pacer:
     def wait(self) -> int:
         """Wait for the next deadline and return its stamp."""
         self._deadline_ns += self.period_ns
-        late_ns = self._clock.now_ns() - self._deadline_ns
-        if late_ns > 0:
-            skipped = late_ns // self.period_ns
-            self.missed += 1 + skipped
-            self._deadline_ns += skipped * self.period_ns
-            return self._deadline_ns
         while (left_ns := self._deadline_ns - self._clock.now_ns()) > 0:
             self._sleep_s(left_ns / SECOND_NS)
+        skipped, late_ns = divmod(-left_ns, self.period_ns)
+        self.missed += skipped + (late_ns > LATE_SHARE * self.period_ns)
+        self._deadline_ns += skipped * self.period_ns
         return self._deadline_ns

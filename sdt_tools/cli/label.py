@@ -77,14 +77,16 @@ def edit(
 
         beside = RerunBeside.in_window()
     sitting = label_by_hand(task, beside)
+    if sitting.ended_by is signal.SIGHUP:  # nobody reads
+        raise typer.Exit(128 + signal.SIGHUP)
     if json_output:
         emit(vars(sitting))
     else:
         new = sitting.labelled - sitting.labelled_before
         done = f"{sitting.labelled:,} of {sitting.frames:,} frames have your label, {new:+,} in this sitting"
         console.print(f"{recording.stem}: {done}; {sitting.conflicts:,} conflicts are open", soft_wrap=True)
-    if sitting.terminated:
-        raise typer.Exit(128 + signal.SIGTERM)
+    if sitting.ended_by is not None:
+        raise typer.Exit(128 + sitting.ended_by)
 
 
 @app.command("stats")

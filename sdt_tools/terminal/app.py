@@ -14,6 +14,8 @@ from textual.screen import ModalScreen
 from textual.widget import Widget
 from textual.widgets import Input, Static
 
+from sdt_tools.terminal.hangup import LastingDriver
+
 ResultT = TypeVar("ResultT")
 
 _LOOK_S: Final = 0.005
@@ -60,11 +62,22 @@ class TerminalApp(App[ResultT], Generic[ResultT]):
     URGENT: ClassVar[frozenset[str]] = frozenset()
     """Keys that do not wait until those before them are done with."""
 
-    terminated = False
-    """Whether SIGTERM has ended it; the terminal is given back first."""
+    ended_by: signal.Signals | None = None
+    """SIGTERM or SIGHUP, where that has ended it. The terminal is given back first, if it is still there."""
+
+    def __init__(self) -> None:
+        super().__init__(driver_class=LastingDriver)
+        self._loop_of_app: asyncio.AbstractEventLoop | None = None
+
+    def hung_up(self) -> None:
+        """End the app, for its terminal is gone. For any thread."""
+        if self._loop_of_app is not None:
+            with suppress(RuntimeError):  # it has ended
+                self._loop_of_app.call_soon_threadsafe(self._end_by, signal.SIGHUP)
 
     def on_mount(self) -> None:
         """Listen to SIGTERM, and to keys."""
+        self._loop_of_app = asyncio.get_running_loop()
         self.listen_to_signals()
         self._typed: asyncio.Queue[events.Key] = asyncio.Queue()
         self.run_worker(self._take_keys())
@@ -101,10 +114,10 @@ class TerminalApp(App[ResultT], Generic[ResultT]):
     def listen_to_signals(self) -> None:
         """Have SIGTERM end the app, as quitting does."""
         with suppress(ValueError, RuntimeError):  # not in the main thread: somebody else listens
-            asyncio.get_running_loop().add_signal_handler(signal.SIGTERM, self._terminate)
+            asyncio.get_running_loop().add_signal_handler(signal.SIGTERM, self._end_by, signal.SIGTERM)
 
-    def _terminate(self) -> None:
-        self.terminated = True
+    def _end_by(self, number: signal.Signals) -> None:
+        self.ended_by = self.ended_by or number
         self.exit()
 
     def on_resize(self, event: events.Resize) -> None:

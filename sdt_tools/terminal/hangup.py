@@ -41,11 +41,28 @@ class _Lasting:
 
 
 class LastingDriver(LinuxDriver):
-    """Textual's driver, for an app that has something to end in order when its terminal is gone."""
+    """Textual's driver, for an app that has something to end in order when its terminal is gone.
+
+    A terminal that hangs up sends SIGCONT to whoever is in its foreground, stopped or not. Textual would begin to read
+    keys once more, beside the thread that reads or after the app has ended, and nothing would end that second thread.
+    """
+
+    _suspended = False
 
     def __init__(self, *arguments: object, **options: object) -> None:
         super().__init__(*arguments, **options)  # type: ignore[arg-type]
         self._file: TextIO = _Lasting(self._file)  # type: ignore[assignment]
+
+    def _sigtstp_application(self, *arguments: object) -> None:
+        """Stop."""
+        self._suspended = True
+        super()._sigtstp_application(*arguments)
+
+    def _sigcont_application(self, *arguments: object) -> None:
+        """Go on after a stop, and only then."""
+        if self._suspended:
+            self._suspended = False
+            super()._sigcont_application(*arguments)
 
     def run_input_thread(self) -> None:
         """Keys, until the terminal is gone."""

@@ -19,6 +19,7 @@ LONGEST_S = 60.0
 KEY_PERIOD_S = 0.05
 RIGHT = "\x1b[C"
 QUIT = "\x11"
+DEAF_TO_HANGUP = "import signal; signal.signal(signal.SIGHUP, signal.SIG_IGN); "
 _TAKE_OVER = "import fcntl, os, termios; os.setsid(); fcntl.ioctl(0, termios.TIOCSCTTY, 0); "
 
 

@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from cockpit_rig import commands, driven, messages, motions, poses, replayed
-from terminal_rig import LONGEST_S, QUIT, RIGHT, Terminal
+from terminal_rig import DEAF_TO_HANGUP, LONGEST_S, QUIT, RIGHT, Terminal
 
 from sdt_tools.clock import SECOND_NS
 from sdt_tools.frames import Gesture, Mode, MotionClass, OperatorState, Twist
@@ -27,7 +27,7 @@ from sdt_tools.recording.reader import Recording
 SDT = [sys.executable, "-c", "from sdt_tools.cli.app import main; main()"]
 PLAIN = ["--scenario", "plain", "--seed", "7", "--no-camera"]
 RELEASE = "\x12"
-DEAF_TO_HANGUP = "import signal; signal.signal(signal.SIGHUP, signal.SIG_IGN); "
+CLOSED_SCREEN = b"\x1b[?1049l"
 STOP_S = 0.3
 """A robot whose terminal is gone has its stop command by then."""
 
@@ -87,7 +87,7 @@ def test_scripted_keys_drive_the_scene_and_the_recorded_commands_drive_it_again(
     )
 
 
-@pytest.mark.parametrize("how", ["hang-up", "hang-up without a signal", "SIGTERM"])
+@pytest.mark.parametrize("how", ["hang-up", "hang-up without a signal", "SIGTERM", "SIGTERM, then hang-up"])
 def test_what_ends_the_terminal_in_mid_motion_stops_the_robot_and_the_file_is_whole(
     tmp_path: Path, cockpit: Start, how: str
 ) -> None:
@@ -101,6 +101,12 @@ def test_what_ends_the_terminal_in_mid_motion_stops_the_robot_and_the_file_is_wh
         end_ns = time.time_ns()
         assert terminal.end() == 128 + signal.SIGTERM
         assert terminal.restored
+    elif how == "SIGTERM, then hang-up":
+        terminal.process.send_signal(signal.SIGTERM)
+        end_ns = time.time_ns()
+        terminal.until(lambda: CLOSED_SCREEN in terminal.shown, "the screen is not closed")
+        terminal.hang_up()
+        assert terminal.process.wait(LONGEST_S) in (128 + signal.SIGTERM, -signal.SIGHUP)
     else:
         end_ns = terminal.hang_up()
         assert terminal.process.wait(LONGEST_S) == 128 + signal.SIGHUP
@@ -109,7 +115,7 @@ def test_what_ends_the_terminal_in_mid_motion_stops_the_robot_and_the_file_is_wh
     assert (stop.driver, stop.twist) == (STOP, Twist(0.0, 0.0))
     assert before_ns <= stop_ns < end_ns + STOP_S * SECOND_NS
     with Recording.open(path) as recording:
-        assert recording.stats["ending"] == ("terminated" if how == "SIGTERM" else "hangup")
+        assert recording.stats["ending"] == ("terminated" if "SIGTERM" in how else "hangup")
 
 
 def test_a_source_that_hangs_stops_the_robot_and_does_not_keep_anyone_from_quitting(

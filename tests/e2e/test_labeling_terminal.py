@@ -13,7 +13,7 @@ from pathlib import Path
 
 import pytest
 from labeling_rig import frame_shown, record, rows_labelled
-from terminal_rig import LONGEST_S, QUIT, RIGHT, Terminal, terminal_environment
+from terminal_rig import DEAF_TO_HANGUP, LONGEST_S, QUIT, RIGHT, Terminal, terminal_environment
 
 Start = Callable[..., Terminal]
 SDT = [sys.executable, "-c", "from sdt_tools.cli.app import main; main()"]
@@ -90,16 +90,17 @@ def test_keys_that_come_at_once_are_taken_one_after_the_other(tmp_path: Path, la
     assert rows_labelled(tmp_path / "labels" / "drive.motion.csv", "anna") == [40, 51]
 
 
-@pytest.mark.parametrize("how", ["hang-up", "SIGTERM"])
+@pytest.mark.parametrize("how", ["hang-up", "hang-up without a signal", "SIGTERM"])
 def test_the_end_of_a_terminal_is_the_end_of_the_app_and_nothing_is_lost(
     tmp_path: Path, labeling: Start, how: str
 ) -> None:
     drive = record(tmp_path / "drive.mcap", 30)
-    terminal = labeling(*label(tmp_path, drive, "anna"))
+    before = DEAF_TO_HANGUP if how == "hang-up without a signal" else ""
+    terminal = labeling(*label(tmp_path, drive, "anna"), before=before)
     terminal.wait_for("? keys")
     terminal.press("f2" + 9 * RIGHT)
     terminal.until(lambda: frame_shown(terminal, 30) == 10, "the tenth frame is not shown")
-    if how == "hang-up":
+    if how != "SIGTERM":
         terminal.hang_up()
     else:
         terminal.process.send_signal(signal.SIGTERM)

@@ -1,5 +1,6 @@
 """The labeling app as a whole."""
 
+import signal
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -11,6 +12,7 @@ from sdt_tools.labeling.app.screen import LabelingScreen
 from sdt_tools.labeling.app.state import State
 from sdt_tools.labeling.frame_labels import UNSAID
 from sdt_tools.terminal.app import TerminalApp, follow_the_terminal
+from sdt_tools.terminal.hangup import hangup_watched
 
 
 class LabelingApp(TerminalApp[None]):
@@ -36,7 +38,7 @@ class LabelingApp(TerminalApp[None]):
 class Sitting:
     """What came of it: ``labelled`` of ``frames`` have the labeler's label now, ``conflicts`` are left.
 
-    ``terminated`` by SIGTERM, not by the labeler.
+    ``ended_by`` a signal (SIGTERM, or SIGHUP where the terminal is gone), not by the labeler.
     """
 
     frames: int
@@ -44,7 +46,7 @@ class Sitting:
     labelled_before: int
     conflicts: int
     counts: dict[str, int]
-    terminated: bool = False
+    ended_by: signal.Signals | None = None
 
 
 def label_by_hand(task: Task, beside: Beside | None = None) -> Sitting:
@@ -57,7 +59,8 @@ def label_by_hand(task: Task, beside: Beside | None = None) -> Sitting:
             app = LabelingApp(desk, beside)
             before = int(np.count_nonzero(desk.opened.mine != UNSAID))
             follow_the_terminal()
-            app.run()
+            with hangup_watched(app.hung_up):
+                app.run()
     finally:
         if beside is not None:
             beside.close()
@@ -68,5 +71,5 @@ def label_by_hand(task: Task, beside: Beside | None = None) -> Sitting:
         labelled_before=before,
         conflicts=int(state.labels.disputed.sum()),
         counts=dict(zip(state.classes, state.labels.counts(state.mine), strict=True)),
-        terminated=app.terminated,
+        ended_by=app.ended_by,
     )

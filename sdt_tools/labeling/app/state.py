@@ -237,7 +237,9 @@ def toggle_carry(state: State) -> Turn:
 
 
 def let_go(state: State) -> Turn:
-    """Give up range, settling and playing."""
+    """Give up range, settling and playing; where none of them was begun, carrying."""
+    if state.carrying and state.anchor is None and not state.settling and not state.speed:
+        return toggle_carry(state)
     return Turn(replace(state, anchor=None, settling=False, speed=0.0, words=""))
 
 

@@ -57,8 +57,9 @@ class RecordingSummary:
     """What was recorded. ``frames`` are messages by topic.
 
     ``dropped`` are those that the recorder gave up because disk or encoder could not keep up, ``missing`` those that
-    the sensors' stamps show never to have come. ``missed_deadlines`` are ticks and decisions that came too late in real
-    time; ``forced`` of the ``decisions`` were not the driver's own. ``pauses_ns`` are half-open, in host time.
+    the sensors' stamps show never to have come. ``missed_deadlines`` are, in real time, ticks that
+    came more than half a period late and decisions that could not be made within their period; ``forced`` of the
+    ``decisions`` were not the driver's own. ``pauses_ns`` are half-open, in host time.
     """
 
     recording_id: str

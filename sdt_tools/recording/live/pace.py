@@ -23,7 +23,7 @@ class Pace(Protocol):
 
     @property
     def missed(self) -> int:
-        """Ticks that came too late."""
+        """Ticks that came too late: by more than half a period."""
         ...
 
     def next_ns(self) -> int:
@@ -65,7 +65,7 @@ class RealPace:
 
     @property
     def missed(self) -> int:
-        """Ticks that came too late."""
+        """Ticks that came too late: by more than half a period."""
         return self._pacer.missed
 
     def next_ns(self) -> int:

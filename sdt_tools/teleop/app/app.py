@@ -14,7 +14,7 @@ from sdt_tools.teleop.app.dialogs import HelpDialog, NoteDialog
 from sdt_tools.teleop.app.screen import SHOW_S, CockpitScreen
 from sdt_tools.teleop.cockpit import Cockpit, Recording
 from sdt_tools.terminal.app import TerminalApp, follow_the_terminal
-from sdt_tools.terminal.hangup import LastingDriver, hangup_watched
+from sdt_tools.terminal.hangup import hangup_watched
 
 ResultT = TypeVar("ResultT")
 
@@ -27,7 +27,7 @@ class CockpitApp(TerminalApp[None]):
     BINDINGS: ClassVar[list[BindingType]] = [Binding("escape", "emergency", priority=True)]
 
     def __init__(self, cockpit: Cockpit, recording: Recording[object]) -> None:
-        super().__init__(driver_class=LastingDriver)
+        super().__init__()
         self._recording = recording
         self._cockpit = cockpit
         self._seat = CockpitScreen(cockpit)

@@ -52,7 +52,8 @@ def heading(cockpit: Cockpit, view: View, width: int) -> Text:
 
 def _take(progress: RecordingProgress | None) -> Text:
     if progress is None:
-        return Text("getting ready …", style(WARM))
+        # numba keeps what it has compiled of the scene
+        return Text("getting ready … a scene compiles once after an install: 20 s", style(WARM))
     clock = f"{int(progress.recorded_s) // 60}:{progress.recorded_s % 60:04.1f}"
     if progress.total_s is not None:
         clock += f" of {progress.total_s:g} s"

@@ -34,8 +34,22 @@ def test_a_pacer_in_time_releases_once_a_period_and_misses_nothing() -> None:
 def test_a_late_caller_is_released_at_once_and_the_deadlines_it_slept_through_are_counted() -> None:
     time = FakeTime()
     pacer = Pacer(100, time.clock(), time.sleep_s)
-    time.monotonic += 350
+    time.monotonic += 360
     assert pacer.wait() - 5_000_000 == 300
     assert pacer.missed == 3
     assert pacer.wait() - 5_000_000 == 400
     assert pacer.missed == 3
+
+
+def test_half_a_period_is_not_late_and_more_is_whoever_slept_it() -> None:
+    time = FakeTime()
+    oversleeping = [0, 50, 51, 100]
+
+    def sleep_s(seconds: float) -> None:
+        time.sleep_s(seconds)
+        time.monotonic += oversleeping.pop(0)
+
+    pacer = Pacer(100, time.clock(), sleep_s)
+    assert [(pacer.wait() - 5_000_000, pacer.missed) for _ in range(4)] == [(100, 0), (200, 0), (300, 1), (500, 2)]
+    time.monotonic += 150
+    assert (pacer.wait() - 5_000_000, pacer.missed) == (600, 2)

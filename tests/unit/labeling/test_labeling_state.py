@@ -98,6 +98,15 @@ def test_carrying_forward_labels_what_is_passed_until_the_class_changes() -> Non
     assert anna.mine == "111000...."
 
 
+def test_letting_go_ends_what_was_begun_last_and_then_carrying() -> None:
+    anna = Labeler()
+    anna.key(turns.toggle_carry)
+    anna.key(turns.toggle_range)
+    after_one, after_two = anna.key(turns.let_go), anna.key(turns.let_go)
+    assert (after_one.anchor, after_one.carrying) == (None, True)
+    assert not after_two.carrying
+
+
 def test_carrying_leaves_alone_what_was_labelled_before_and_what_is_jumped_over() -> None:
     anna = Labeler()
     anna.go(2)
