@@ -158,11 +158,27 @@ def test_views_vary_within_bounds_and_mirror_at_the_middle() -> None:
     assert 0 < np.abs(lit.astype(int) - image).max() <= 0.2 * 128 * 2 + 1
 
 
+def test_views_turn_hues_and_keep_what_is_bright() -> None:
+    image = np.zeros((8, 8, 3), np.uint8)
+    image[:, :4] = (200, 40, 40)
+    image[:, 4:] = 90
+    still = ViewConfig(mirror=False, shift=0.0, zoom=0.0, turn_deg=0.0, light=0.0, hue_deg=180.0)
+    seen = [varied(image, still, np.random.default_rng(seed)) for seed in range(40)]
+
+    assert len({view[0, 0].tobytes() for view in seen}) > 20
+    assert {tuple(sorted((int(view[0, 0].max()), int(view[0, 0].min())))) for view in seen} == {(40, 200)}
+    assert all((view[:, 4:] == 90).all() for view in seen)
+    faded = still.model_copy(update={"hue_deg": 0.0, "saturation": 1.0})
+    spans = [int(np.ptp(varied(image, faded, np.random.default_rng(seed))[0, 0])) for seed in range(40)]
+    assert min(spans) < 40
+    assert max(spans) > 170
+
+
 def test_recipes_keep_each_backbones_own_statistics() -> None:
     lite, resnet = vision_recipe("lite0", 0), vision_recipe("resnet50", 2)
     assert lite.preprocess.mean == (127.0, 127.0, 127.0)
     assert resnet.preprocess.mean == (123.675, 116.28, 103.53)
-    assert (resnet.epochs, resnet.adversarial.epsilon, resnet.adversarial.plain_epochs) == (12, 2, 4)
+    assert (resnet.epochs, resnet.adversarial.epsilon, resnet.adversarial.plain_epochs) == (9, 2, 5)
     assert vision_recipe("lite0", 1, epochs=1).adversarial.plain_epochs == 0
     with pytest.raises(UsageError, match="choose lite0 or resnet50"):
         vision_recipe("vgg", 0)
