@@ -11,7 +11,7 @@ import typer
 
 from sdt_tools.cli.console import JsonFlag, console, emit
 from sdt_tools.emulation.camera.faults import FAULTS as CAMERA_FAULTS
-from sdt_tools.emulation.faults import FORM
+from sdt_tools.emulation.faults import FORM_IN_HELP
 from sdt_tools.emulation.lms1xx.fault_kinds import FAULTS as LIDAR_FAULTS
 from sdt_tools.emulation.p3at.faults import FAULTS as BASE_FAULTS
 from sdt_tools.errors import OutputExistsError
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from sdt_tools.evaluation.robot_truth import RobotTruth
 
 _FAULT_HELP = (
-    f"What goes wrong, as DEVICE:{FORM} in seconds from the start, as base:power@20-25; repeat for more. "
+    f"What goes wrong, as DEVICE:{FORM_IN_HELP} in seconds from the start, as base:power@20-25; repeat for more. "
     f"lidar: {LIDAR_FAULTS} base: {BASE_FAULTS} camera: {CAMERA_FAULTS}"
 )
 KEYS_HELP = "Keys at a terminal: o has the operator show enable, p disable, i nothing."

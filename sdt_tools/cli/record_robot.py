@@ -11,7 +11,6 @@ from sdt_tools.cli.endings import last_words
 from sdt_tools.cli.live import Live
 from sdt_tools.cli.record_report import print_recording, recording_document, seconds_of
 from sdt_tools.errors import OutputExistsError, UsageError
-from sdt_tools.teleop.hand import GAMEPAD, KEYBOARD
 
 if TYPE_CHECKING:
     from sdt_tools.control.driving import DriveSummary
@@ -112,6 +111,7 @@ def _driver(name: str) -> "Driver | None":
     """Who drives by itself: nobody, for ``none`` and by hand. Networks are ready to decide."""
     from sdt_tools.cli.drivers import make_robot_driver
     from sdt_tools.control.robot.drive import warm_up
+    from sdt_tools.teleop.hand import GAMEPAD, KEYBOARD
 
     if name in (NOBODY, KEYBOARD, GAMEPAD):
         return None

@@ -9,7 +9,9 @@ from typing import Final
 from sdt_tools.errors import UsageError
 
 FORM: Final = "KIND[=VALUE][@FROM[-TO[/EVERY]]]"
-HOW: Final = f"What goes wrong, as {FORM} in seconds from the start; repeat for more."
+FORM_IN_HELP: Final = FORM.replace("[", "\\[")
+"""For where brackets would be markup."""
+HOW: Final = f"What goes wrong, as {FORM_IN_HELP} in seconds from the start; repeat for more."
 _NUMBER: Final = r"\d+(?:\.\d+)?"
 _PATTERN: Final = re.compile(
     rf"(?P<kind>[a-z-]+)(=(?P<value>-?{_NUMBER}))?"

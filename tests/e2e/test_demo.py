@@ -10,7 +10,7 @@ from mcap.reader import make_reader
 pytestmark = pytest.mark.xdist_group("demo")  # one demo for all of them
 SDT = Path(sys.executable).with_name("sdt")
 SMALL = """
-practice_recordings = 16
+practice_recordings = 24
 practice_seconds = 6.0
 camera_recordings = 1
 camera_seconds = 2.0
@@ -61,7 +61,7 @@ def test_the_summary_holds_what_is_promised_and_lies_beside_the_report(demo: tup
     assert set(summary) >= KEYS
     assert json.loads((out / "summary.json").read_text()) == summary
     recordings = list((out / "recordings").rglob("*.mcap"))
-    assert summary["recordings"] == len(recordings) == 17
+    assert summary["recordings"] == len(recordings) == 25
     assert summary["frames"] == sum(scans_in(path) for path in recordings)
     assert summary["closed_loop"]["plain"]["runs"] == 2
     tags = summary["tags"]

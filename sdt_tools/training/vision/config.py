@@ -69,7 +69,7 @@ _ATTACKED_EPOCHS: Final = 9
 
 
 def vision_recipe(backbone: str, epsilon: int, epochs: int | None = None) -> VisionTrainingConfig:
-    """The settings that a training without a configuration starts from; an attacked one's first half is plain.
+    """What a training without a configuration starts from; of an attacked one's nine epochs five are plain.
 
     Raises UsageError for an unknown backbone.
     """
@@ -81,5 +81,5 @@ def vision_recipe(backbone: str, epsilon: int, epochs: int | None = None) -> Vis
         return plain
     planned = _ATTACKED_EPOCHS if epochs is None else epochs
     return plain.model_copy(
-        update={"epochs": planned, "adversarial": AdversarialConfig(epsilon=epsilon, plain_epochs=(planned + 1) // 2)}
+        update={"epochs": planned, "adversarial": AdversarialConfig(epsilon=epsilon, plain_epochs=planned * 5 // 9)}
     )
