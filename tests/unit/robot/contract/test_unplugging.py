@@ -1,6 +1,7 @@
 """Unplugging a device while its driver is checked: the person is asked, and the driver's remark is timed."""
 
 import numpy as np
+import pytest
 
 from sdt_tools.emulation.lms1xx.config import EmulatedConfig
 from sdt_tools.emulation.lms1xx.emulator import EmulatedLms1xx
@@ -16,6 +17,7 @@ class Wall:
         return np.full(RAYS, 2.0)
 
 
+@pytest.mark.slow  # in real time: where a machine is busy the remark can pass by unseen
 def test_a_cable_is_pulled_and_plugged_in_again() -> None:
     asked = []
     with EmulatedLms1xx(Wall(), EmulatedConfig(port=0)) as emulator:
