@@ -55,7 +55,7 @@ def vision(
     workers: Annotated[int, typer.Option(min=1, help="Processes, one thread each.")] = 2,
     json_output: JsonFlag = False,
 ) -> None:
-    """Record, train, attack and drive the vision networks of all ε: about two hours on two cores.
+    """Record, train, attack and drive the vision networks of all ε: some hours on two cores.
 
     Gives the paper's Tables I and V with intervals, and the attack figure.
     """

@@ -1,7 +1,6 @@
 """The follow study's report: Markdown tables with what the paper prints beside what was measured, and figures."""
 
 import json
-from collections.abc import Sequence
 from pathlib import Path
 from typing import Final
 
@@ -17,9 +16,9 @@ from sdt_tools.paper.follow_tables import (
     scenario_counts,
     sweep_rows,
 )
+from sdt_tools.paper.markdown import counted, ranged, table_line
 from sdt_tools.paper.printed import LEVELS, TRAINING_FRAMES, VALIDATION_FRAMES
 from sdt_tools.scene.scenario import STANDARD_FOLLOW
-from sdt_tools.statistics import wilson
 
 REPORT: Final = "follow.md"
 FAMILIES: Final = {
@@ -94,9 +93,9 @@ def _levels(tables: FollowTables) -> str:
         paper = f"{printed.train_percent} %, {printed.val_percent} %" if printed else ""
         certified = "" if row["level"] == 0 else f"{row['least_certified']} of {row['domains']} in the worst seed"
         margin = "" if row["level"] == 0 else f"{row['least_margin']:.2f}"
-        spreads = [_spread(row[name]) for name in ("train_accuracy", "val_accuracy", "val_forward_recall")]
+        spreads = [ranged(row[name]) for name in ("train_accuracy", "val_accuracy", "val_forward_recall")]
         cells = [FAMILIES[row["family"]], paper, *spreads, certified, margin, f"{row['seconds'][1]:.0f}"]
-        lines.append(_line(cells))
+        lines.append(table_line(cells))
     lines += ["", "![Accuracy against strictness](follow_trade.png)"]
     return "\n".join(lines)
 
@@ -114,7 +113,7 @@ def _cost(tables: FollowTables) -> str:
     for row in cost_rows(tables):
         losses = [f"{100 * row[name]:.1f} points" for name in ("accuracy_loss", "forward_recall_loss")]
         lines.append(
-            _line([row["size"], *losses, f"{row['pasted_forward']:.1%}", f"{100 * row['clip_loss']:.1f} points"])
+            table_line([row["size"], *losses, f"{row['pasted_forward']:.1%}", f"{100 * row['clip_loss']:.1f} points"])
         )
     return "\n".join(lines)
 
@@ -133,7 +132,7 @@ def _scenarios(tables: FollowTables) -> str:
         cells = [_cell(counts[family][scenario], family, scenario) for family in FAMILIES]
         lines.append(f"| {scenario.replace('_', ' ')} | " + " | ".join(cells) + " |")
     totals = [counts[family]["total"] for family in FAMILIES]
-    lines.append("| **all** | " + " | ".join(_interval(total["ok"], total["runs"]) for total in totals) + " |")
+    lines.append("| **all** | " + " | ".join(counted(total["ok"], total["runs"]) for total in totals) + " |")
     lines += ["", "![Driven paths](follow_scenarios.png)"]
     return "\n".join(lines)
 
@@ -153,8 +152,13 @@ def _failures(tables: FollowTables) -> str:
         "|---|---|---|---|",
     ]
     lines += [
-        _line(
-            [row["first"], row["second"], _interval(row["both"], row["failed_first"]), f"{row['expected_share']:.0%}"]
+        table_line(
+            [
+                row["first"],
+                row["second"],
+                counted(row["both"], row["failed_first"]),
+                f"{row['expected_share']:.0%}",
+            ]
         )
         for row in nesting_rows(tables)
     ]
@@ -162,7 +166,7 @@ def _failures(tables: FollowTables) -> str:
     lines += ["| networks | failures | driving forward | median front range |", "|---|---:|---:|---:|"]
     for row in failures_by_motion(tables, list(FAMILIES)):
         near = f"{row['median_front_range_m']:.2f} m" if row["failures"] else ""
-        lines.append(_line([FAMILIES[row["family"]], str(row["failures"]), str(row["forward"]), near]))
+        lines.append(table_line([FAMILIES[row["family"]], str(row["failures"]), str(row["forward"]), near]))
     return "\n".join(lines)
 
 
@@ -175,8 +179,8 @@ def _sweep(tables: FollowTables) -> str:
     ]
     for row in sweep_rows(tables):
         certified = f"{row['least_certified']} to {row['most_certified']}"
-        spreads = [_spread(row[name]) for name in ("val_accuracy", "val_forward_recall")]
-        lines.append(_line([str(row["level"]), f"{row['weight']:g}", str(row["networks"]), *spreads, certified]))
+        spreads = [ranged(row[name]) for name in ("val_accuracy", "val_forward_recall")]
+        lines.append(table_line([str(row["level"]), f"{row['weight']:g}", str(row["networks"]), *spreads, certified]))
     lines += ["", "![Accuracy by λ and level](follow_lambda.png)"]
     return "\n".join(lines)
 
@@ -209,19 +213,3 @@ def _checks(tables: FollowTables) -> str:
         cells = [f"{values[name]['median']:.1%}, {values[name]['worst']:.1%}" for name in names]
         lines.append(f"| {title} | " + " | ".join(cells) + " |")
     return "\n".join(lines)
-
-
-def _line(cells: Sequence[str]) -> str:
-    return f"| {' | '.join(cells)} |"
-
-
-def _spread(values: Sequence[float]) -> str:
-    low, median, high = values
-    return f"{median:.1%} ({low:.1%} to {high:.1%})"
-
-
-def _interval(successes: int, trials: int) -> str:
-    if trials == 0:
-        return "none"
-    low, high = wilson(successes, trials)
-    return f"{successes} of {trials} ({low:.0%} to {high:.0%})"

@@ -12,11 +12,11 @@ import polars as pl
 from sdt_tools.evaluation.vision.figure import errors_figure
 from sdt_tools.evaluation.vision.results import VisionTally
 from sdt_tools.evaluation.vision.spread import Evenness
+from sdt_tools.paper.markdown import counted, ranged, table_line
 from sdt_tools.paper.printed import EPSILONS, MODE_ERRORS
 from sdt_tools.paper.vision_config import VisionStudyConfig
 from sdt_tools.paper.vision_models import CONTROL
 from sdt_tools.scene.scenario import STANDARD_VISION
-from sdt_tools.statistics import wilson
 
 REPORT: Final = "vision.md"
 EXHIBIT: Final = "vision_attack.png"
@@ -108,9 +108,9 @@ def _accuracies(tables: VisionTables) -> str:
     for row in accuracy_rows(tables.networks):
         printed = EPSILONS.get(row["epsilon"]) if row["family"] != CONTROL else None
         paper = f"{printed.attacked_train_percent} %, {printed.val_percent} %" if printed else ""
-        spreads = [_spread(row[name]) for name in ("adversarial_train_accuracy", "train_accuracy", "val_accuracy")]
+        spreads = [ranged(row[name]) for name in ("adversarial_train_accuracy", "train_accuracy", "val_accuracy")]
         recalls = ", ".join(f"{row[f'val_recall_{gesture}'][1]:.1%}" for gesture in ("idle", "enable", "disable"))
-        lines.append(_line([_title(row["family"]), paper, *spreads, recalls, f"{row['seconds'][1]:.0f}"]))
+        lines.append(table_line([_title(row["family"]), paper, *spreads, recalls, f"{row['seconds'][1]:.0f}"]))
     guesses = sorted(tables.baseline)
     lines += [
         "",
@@ -133,8 +133,8 @@ def _attacks(tables: VisionTables) -> str:
     rows = {(row["family"], row["method"], row["epsilon"], row["target"]): row for row in rate_rows(tables.rates)}
     for family, method, epsilon in dict.fromkeys(key[:3] for key in rows):
         cells = [rows[family, method, epsilon, target] for target in ("any other", "enable")]
-        rates = [_interval(cell["succeeded"], cell["images"]) for cell in cells]
-        lines.append(_line([_title(family), method.upper(), f"±{epsilon}", *rates]))
+        rates = [counted(cell["succeeded"], cell["images"]) for cell in cells]
+        lines.append(table_line([_title(family), method.upper(), f"±{epsilon}", *rates]))
     lines += ["", f"![A disable image and what the attack makes of it]({EXHIBIT})"]
     return "\n".join(lines)
 
@@ -153,20 +153,20 @@ def _scenarios(tables: VisionTables, config: VisionStudyConfig) -> str:
     ]
     for scenario in STANDARD_VISION:
         cells = [_errors(one[scenario], MODE_ERRORS.get(eps, {}).get(scenario)) for eps, one in tables.modes.items()]
-        lines.append(_line([scenario.replace("_", " "), *cells]))
+        lines.append(table_line([scenario.replace("_", " "), *cells]))
     cells = [
         _errors(one, sum(MODE_ERRORS.get(eps, {}).values()), len(STANDARD_VISION)) for eps, one in tables.totals.items()
     ]
-    lines.append(_line(["**all seven**", *cells]))
+    lines.append(table_line(["**all seven**", *cells]))
     totals = list(tables.totals.values())
-    lines.append(_line(["commands missed", *(f"{one.missed} of {one.commands}" for one in totals)]))
-    lines.append(_line(["runs that did all that was commanded", *(_interval(one.ok, one.runs) for one in totals)]))
-    lines.append(_line(["even over scenarios? p", *(_evenness(one) for one in tables.spread.values())]))
+    lines.append(table_line(["commands missed", *(f"{one.missed} of {one.commands}" for one in totals)]))
+    lines.append(table_line(["runs that did all that was commanded", *(counted(one.ok, one.runs) for one in totals)]))
+    lines.append(table_line(["even over scenarios? p", *(_evenness(one) for one in tables.spread.values())]))
     doing = [
         ", ".join(f"{name.replace('_', ' ')} {n}" for name, n in list(one.items())[:4])
         for one in tables.errors_while.values()
     ]
-    lines.append(_line(["most errors while", *doing]))
+    lines.append(table_line(["most errors while", *doing]))
     lines += ["", f"![Mode errors by scenario]({_ERRORS})"]
     return "\n".join(lines)
 
@@ -185,19 +185,3 @@ def _evenness(spread: Evenness) -> str:
 
 def _title(family: str) -> str:
     return "plain, on the attacked schedule" if family == CONTROL else f"ε = {family.removeprefix('epsilon')}"
-
-
-def _line(cells: Sequence[str]) -> str:
-    return f"| {' | '.join(cells)} |"
-
-
-def _spread(values: Sequence[float]) -> str:
-    low, median, high = values
-    return f"{median:.1%} ({low:.1%} to {high:.1%})"
-
-
-def _interval(successes: int, trials: int) -> str:
-    if trials == 0:
-        return "none"
-    low, high = wilson(successes, trials)
-    return f"{successes} of {trials} ({low:.0%} to {high:.0%})"
